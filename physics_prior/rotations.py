@@ -1,9 +1,9 @@
 """Unit quaternions and rotation vectors.
 
 A quaternion is q = (w, x, y, z) and turns body coordinates into world coordinates; q and -q are the same
-rotation. The product o is Hamilton's. Every function but `quaternion_from_matrix` takes leading batch
-dimensions. Formulas: the corrected equations 1 and 2 of docs/equations.md; exp, log and the Jacobians as in
-Sola, "Quaternion kinematics for the error-state Kalman filter" (2017), sections 2 and 4.
+rotation. The product o is Hamilton's. All functions but those that take a matrix have leading
+batch dimensions. Formulas: the corrected equations 1 and 2 of docs/equations.md; exp, log and the Jacobians as
+in Sola, "Quaternion kinematics for the error-state Kalman filter" (2017), sections 2 and 4.
 """
 
 import numpy as np
@@ -104,11 +104,8 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
     )
 
 
-def quaternion_from_matrix(R: ArrayLike) -> Array:
-    """Return the unit quaternion, shape (4,), largest component positive, of a rotation matrix, shape (3, 3).
-
-    Equation 1 is linear in the products of the components, so R gives the matrix 4 q q^T; its row with the
-    largest diagonal is q times a number that is never small, for any axis and angle (Shepperd's method).
+def require_rotation(R: ArrayLike) -> Array:
+    """Return R as an array, shape (3, 3), if it is a rotation matrix to rounding.
 
     Raises:
         ModelError: R is not a rotation: not finite, R^T R further than 1e-6 from the identity, or mirrored.
@@ -122,6 +119,19 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
         raise ModelError(f"rotation matrix {R.tolist()} is not orthonormal: R^T R is off by {error:.3g}")
     if np.linalg.det(R) < 0.0:
         raise ModelError(f"rotation matrix {R.tolist()} mirrors: its determinant must be +1, not -1")
+    return R
+
+
+def quaternion_from_matrix(R: ArrayLike) -> Array:
+    """Return the unit quaternion, shape (4,), largest component positive, of a rotation matrix, shape (3, 3).
+
+    Equation 1 is linear in the products of the components, so R gives the matrix 4 q q^T; its row with the
+    largest diagonal is q times a number that is never small, for any axis and angle (Shepperd's method).
+
+    Raises:
+        ModelError: R is not a rotation, as in `require_rotation`.
+    """
+    R = require_rotation(R)
     products = np.empty((4, 4))
     trace = np.trace(R)
     products[0, 0] = 1.0 + trace

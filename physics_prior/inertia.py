@@ -167,9 +167,9 @@ def from_density(
 ) -> MassProperties:
     """Integrate a density over a box, by Gauss-Legendre quadrature with three points a cell and axis.
 
-    Exact for densities that are polynomials up to degree 3 in each coordinate. Elsewhere the error falls with the
-    sixth power of the cell size where the density is smooth, and a little faster than linearly where it jumps: a
-    ball in a box with 32 cells is right to 2e-4 in mass and 3e-4 in inertia.
+    Exact for densities that are polynomials up to degree 3 in each coordinate. Elsewhere the error falls with
+    the sixth power of the cell size where the density is smooth, and a little faster than linearly where it
+    jumps: a ball in a box with 32 cells is right to 2e-4 in mass and 3e-4 in inertia.
 
     Args:
         density: maps points, (n, 3) m, to densities, (n,) kg/m^3, finite and >= 0.
@@ -178,8 +178,8 @@ def from_density(
         cells: per axis, 1 to 128; memory stays below 30 MB besides what the density itself takes.
 
     Raises:
-        ModelError: corners not in order, cells out of range, a density of wrong shape, not finite, negative or
-            zero everywhere.
+        ModelError: corners not in order, cells out of range, a density of wrong shape, not finite, negative
+            or zero everywhere.
     """
     lower, upper = _finite("lower", lower, (3,)), _finite("upper", upper, (3,))
     if not np.all(lower < upper):

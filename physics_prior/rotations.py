@@ -2,8 +2,8 @@
 
 A quaternion is q = (w, x, y, z) and turns body coordinates into world coordinates; q and -q are the same
 rotation. The product o is Hamilton's. All functions but those that take a matrix have leading
-batch dimensions. Formulas: the corrected equations 1 and 2 of docs/equations.md; exp, log and the Jacobians as
-in Sola, "Quaternion kinematics for the error-state Kalman filter" (2017), sections 2 and 4.
+batch dimensions. Formulas: the corrected equations 1 and 2 of docs/equations.md; exp, log and the Jacobians
+as in Sola, "Quaternion kinematics for the error-state Kalman filter" (2017), sections 2 and 4.
 """
 
 import numpy as np

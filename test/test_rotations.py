@@ -33,31 +33,31 @@ def to_scipy(q: np.ndarray) -> Rotation:
 def test_unit_quaternions_are_a_group(p, q, r):
     left = rotations.multiply(rotations.multiply(p, q), r)
     right = rotations.multiply(p, rotations.multiply(q, r))
-    np.testing.assert_allclose(left, right, atol=1e-15)  # 4e-16
+    np.testing.assert_allclose(left, right, atol=5e-15)  # 4e-16
     np.testing.assert_array_equal(rotations.multiply(q, IDENTITY), q)
     np.testing.assert_array_equal(rotations.multiply(IDENTITY, q), q)
-    np.testing.assert_allclose(rotations.multiply(q, rotations.conjugate(q)), IDENTITY, atol=1e-15)  # 2e-16
-    assert abs(np.linalg.norm(left) - 1.0) < 1e-15  # 4e-16
+    np.testing.assert_allclose(rotations.multiply(q, rotations.conjugate(q)), IDENTITY, atol=5e-15)  # 6e-16
+    assert abs(np.linalg.norm(left) - 1.0) < 5e-15  # 6e-16
 
 
 @given(quaternions, quaternions)
 def test_left_and_right_matrices_are_the_product(p, q):
-    np.testing.assert_allclose(rotations.left_matrix(q) @ p, rotations.multiply(q, p), atol=1e-15)
-    np.testing.assert_allclose(rotations.right_matrix(q) @ p, rotations.multiply(p, q), atol=1e-15)
+    np.testing.assert_allclose(rotations.left_matrix(q) @ p, rotations.multiply(q, p), atol=5e-15)
+    np.testing.assert_allclose(rotations.right_matrix(q) @ p, rotations.multiply(p, q), atol=5e-15)
 
 
 @given(unit_quaternions, unit_quaternions, vectors)
 def test_scipy_agrees(p, q, v):
     R = rotations.matrix_from_quaternion(q)
     np.testing.assert_allclose(R, to_scipy(q).as_matrix(), atol=1e-14)  # 7e-16
-    np.testing.assert_allclose(rotations.rotate(q, v), to_scipy(q).apply(v), atol=1e-13)  # 5e-15
+    np.testing.assert_allclose(rotations.rotate(q, v), to_scipy(q).apply(v), atol=1e-13)  # 1e-14
     np.testing.assert_allclose(
         rotations.matrix_from_quaternion(rotations.multiply(p, q)),
         (to_scipy(p) * to_scipy(q)).as_matrix(),
         atol=1e-14,
     )
     back = rotations.quaternion_from_matrix(R)
-    assert min(np.max(np.abs(back - q)), np.max(np.abs(back + q))) < 1e-15  # 6e-16
+    assert min(np.max(np.abs(back - q)), np.max(np.abs(back + q))) < 5e-15  # 3e-16
 
 
 @given(vectors)
@@ -68,7 +68,7 @@ def test_exp_and_log_agree_with_scipy(v):
     shortest = rotations.log(rotations.exp(v))
     assert np.linalg.norm(shortest) <= np.pi
     if np.linalg.norm(v) < np.pi:
-        np.testing.assert_allclose(shortest, v, atol=1e-14)  # 3e-15
+        np.testing.assert_allclose(shortest, v, atol=1e-14)  # 4e-16
 
 
 def test_corrected_matrix_and_not_the_printed_one():
@@ -78,8 +78,8 @@ def test_corrected_matrix_and_not_the_printed_one():
     corrected = rotations.matrix_from_quaternion(q)
     printed = corrected.copy()
     printed[0, 2] = 2.0 * (x * z - w * y)
-    assert corrected[0, 2] == pytest.approx(0.5, abs=1e-15)  # sin 30 degrees: z tips towards +x
-    np.testing.assert_allclose(corrected.T @ corrected, np.eye(3), atol=1e-15)
+    assert corrected[0, 2] == pytest.approx(0.5, abs=5e-15)  # sin 30 degrees: z tips towards +x
+    np.testing.assert_allclose(corrected.T @ corrected, np.eye(3), atol=5e-15)
     assert np.max(np.abs(printed.T @ printed - np.eye(3))) > 0.8  # 0.87
     with pytest.raises(ModelError, match="not orthonormal"):
         rotations.quaternion_from_matrix(printed)
@@ -125,8 +125,8 @@ def test_matrices_slightly_off_are_accepted(size):
         q = rotations.quaternion_from_matrix(R + size * rng.uniform(-1.0, 1.0, (3, 3)))
         v = rotations.log(q)
         assert np.all(np.isfinite(v))
-        assert abs(np.linalg.norm(q) - 1.0) < 1e-15  # 2e-16
-        assert np.max(np.abs(rotations.matrix_from_quaternion(q) - R)) < 4.0 * size + 1e-14  # 2.0 size
+        assert abs(np.linalg.norm(q) - 1.0) < 5e-15  # 2e-16
+        assert np.max(np.abs(rotations.matrix_from_quaternion(q) - R)) < 4.0 * size + 1e-14  # 1.6 size
 
 
 @pytest.mark.parametrize(
@@ -148,8 +148,8 @@ def test_matrices_that_are_no_rotations_are_refused(matrix, complaint):
 @given(quaternions)
 def test_normalize_has_unit_length_and_changes_no_direction(q):
     unit = rotations.normalize(q)
-    assert abs(np.linalg.norm(unit) - 1.0) < 1e-15  # 3e-16
-    np.testing.assert_allclose(unit * np.linalg.norm(q), q, atol=1e-15)
+    assert abs(np.linalg.norm(unit) - 1.0) < 5e-15  # 2e-16
+    np.testing.assert_allclose(unit * np.linalg.norm(q), q, atol=5e-15)
     np.testing.assert_allclose(rotations.log(1.001 * unit), rotations.log(unit), atol=1e-14)
 
 
@@ -184,7 +184,7 @@ def right_jacobian_by_differences(v: np.ndarray, step: float) -> np.ndarray:
 def test_right_jacobian_is_the_derivative_of_exp(v):
     np.testing.assert_allclose(
         rotations.right_jacobian(v), right_jacobian_by_differences(v, 1e-5), atol=1e-9
-    )  # 9e-11
+    )  # 2e-10
 
 
 @pytest.mark.parametrize("length", [0.0, 1e-300, 1e-8, 0.99e-4, 1.01e-4, 1e-3, 1.0, 3.0, np.pi, 5.0])
@@ -192,13 +192,13 @@ def test_jacobians_are_inverse_and_smooth_where_the_series_takes_over(length):
     for axis in AXES:
         v = length * axis
         J = rotations.right_jacobian(v)
-        np.testing.assert_allclose(J @ rotations.inverse_right_jacobian(v), np.eye(3), atol=1e-14)  # 3e-15
+        np.testing.assert_allclose(J @ rotations.inverse_right_jacobian(v), np.eye(3), atol=1e-14)  # 1e-15
         # J_r = sum_k (-[v]x)^k / (k + 1)!
         term = series = np.eye(3)
         for k in range(1, 60):
             term = term @ -rotations.skew(v) / (k + 1)
             series = series + term
-        np.testing.assert_allclose(J, series, atol=1e-13)  # 6e-15
+        np.testing.assert_allclose(J, series, atol=1e-13)  # 7e-16
 
 
 @given(vectors, vectors)
@@ -211,10 +211,10 @@ def test_angular_velocity_and_derivative_are_inverse(q, omega_body):
     """Equation 2: (0; w') = 2 Q(q)^T qdot and (0; w) = 2 Qbar(q)^T qdot."""
     qdot = rotations.derivative(q, omega_body)
     np.testing.assert_allclose(2.0 * rotations.left_matrix(q).T @ qdot, [0.0, *omega_body], atol=1e-13)
-    np.testing.assert_allclose(rotations.angular_velocity_body(q, qdot), omega_body, atol=1e-13)  # 4e-15
+    np.testing.assert_allclose(rotations.angular_velocity_body(q, qdot), omega_body, atol=1e-13)  # 5e-15
     omega_world = rotations.angular_velocity_world(q, qdot)
     np.testing.assert_allclose(2.0 * rotations.right_matrix(q).T @ qdot, [0.0, *omega_world], atol=1e-13)
-    np.testing.assert_allclose(omega_world, rotations.rotate(q, omega_body), atol=1e-13)  # 6e-15
+    np.testing.assert_allclose(omega_world, rotations.rotate(q, omega_body), atol=1e-13)  # 7e-15
 
 
 @given(unit_quaternions, vectors)
@@ -224,7 +224,7 @@ def test_derivative_is_the_rate_of_a_turning_body(q, omega_body):
     behind = rotations.multiply(q, rotations.exp(-step * omega_body))
     np.testing.assert_allclose(
         rotations.derivative(q, omega_body), (ahead - behind) / (2.0 * step), atol=1e-6
-    )  # 9e-9 at |w| = 17 rad/s
+    )  # 8e-9 at |w| = 17 rad/s
 
 
 def test_batches_equal_single_calls():
@@ -258,7 +258,7 @@ def test_repeated_products_stay_unit_and_keep_their_angle():
     q = IDENTITY
     for _ in range(2000):
         q = rotations.normalize(rotations.multiply(q, step))
-    assert abs(np.linalg.norm(q) - 1.0) < 1e-15  # 1e-16
+    assert abs(np.linalg.norm(q) - 1.0) < 5e-15  # 0
     expected = rotations.exp(2000 * np.array([0.01, -0.02, 0.03]))
     angle = np.linalg.norm(rotations.log(rotations.multiply(rotations.conjugate(expected), q)))
-    assert angle < 1e-12  # 6e-14
+    assert angle < 1e-12  # 5e-15

@@ -1,0 +1,1 @@
+"""How the body moves: readable formulations, compiled kernels, constraints, integrators."""

@@ -1,0 +1,217 @@
+"""3-vectors as tuples and 3x3 matrices as 9-tuples (row-major), symmetric ones as 6-tuples (xx, xy, xz, yy, yz, zz).
+
+Tuples become scalars in registers: nothing is allocated, and the kernels above read like the textbook.
+"""
+
+import math
+
+from physics_prior.dynamics.kernel import inline_kernel
+
+ZERO = (0.0, 0.0, 0.0)
+IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+
+@inline_kernel
+def get3(a):
+    """The vector stored in array a."""
+    return a[0], a[1], a[2]
+
+
+@inline_kernel
+def put3(a, u):
+    """Store vector u in array a."""
+    a[0], a[1], a[2] = u[0], u[1], u[2]
+
+
+@inline_kernel
+def add3(a, u):
+    """Add vector u to array a."""
+    a[0] += u[0]
+    a[1] += u[1]
+    a[2] += u[2]
+
+
+@inline_kernel
+def get9(a):
+    """The matrix stored in array a (9,)."""
+    return a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8]
+
+
+@inline_kernel
+def put9(a, m):
+    """Store matrix m in array a (9,)."""
+    a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8] = m
+
+
+@inline_kernel
+def get6(a):
+    """The symmetric matrix stored in array a (6,)."""
+    return a[0], a[1], a[2], a[3], a[4], a[5]
+
+
+@inline_kernel
+def put6(a, m):
+    """Store symmetric matrix m in array a (6,)."""
+    a[0], a[1], a[2], a[3], a[4], a[5] = m
+
+
+@inline_kernel
+def plus(u, w):
+    """The sum u + w."""
+    return u[0] + w[0], u[1] + w[1], u[2] + w[2]
+
+
+@inline_kernel
+def minus(u, w):
+    """The difference u - w."""
+    return u[0] - w[0], u[1] - w[1], u[2] - w[2]
+
+
+@inline_kernel
+def scale(s, u):
+    """The product s u."""
+    return s * u[0], s * u[1], s * u[2]
+
+
+@inline_kernel
+def dot(u, w):
+    """The inner product u . w."""
+    return u[0] * w[0] + u[1] * w[1] + u[2] * w[2]
+
+
+@inline_kernel
+def cross(u, w):
+    """The vector product u x w."""
+    return u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]
+
+
+@inline_kernel
+def times(m, u):
+    """The product m u of a 3x3 matrix and a vector."""
+    return (
+        m[0] * u[0] + m[1] * u[1] + m[2] * u[2],
+        m[3] * u[0] + m[4] * u[1] + m[5] * u[2],
+        m[6] * u[0] + m[7] * u[1] + m[8] * u[2],
+    )
+
+
+@inline_kernel
+def transposed_times(m, u):
+    """The product m^T u."""
+    return (
+        m[0] * u[0] + m[3] * u[1] + m[6] * u[2],
+        m[1] * u[0] + m[4] * u[1] + m[7] * u[2],
+        m[2] * u[0] + m[5] * u[1] + m[8] * u[2],
+    )
+
+
+@inline_kernel
+def symmetric_times(m, u):
+    """The product m u of a symmetric matrix (6-tuple) and a vector."""
+    return (
+        m[0] * u[0] + m[1] * u[1] + m[2] * u[2],
+        m[1] * u[0] + m[3] * u[1] + m[4] * u[2],
+        m[2] * u[0] + m[4] * u[1] + m[5] * u[2],
+    )
+
+
+@inline_kernel
+def product(a, b):
+    """The product a b of 3x3 matrices."""
+    return (
+        a[0] * b[0] + a[1] * b[3] + a[2] * b[6],
+        a[0] * b[1] + a[1] * b[4] + a[2] * b[7],
+        a[0] * b[2] + a[1] * b[5] + a[2] * b[8],
+        a[3] * b[0] + a[4] * b[3] + a[5] * b[6],
+        a[3] * b[1] + a[4] * b[4] + a[5] * b[7],
+        a[3] * b[2] + a[4] * b[5] + a[5] * b[8],
+        a[6] * b[0] + a[7] * b[3] + a[8] * b[6],
+        a[6] * b[1] + a[7] * b[4] + a[8] * b[7],
+        a[6] * b[2] + a[7] * b[5] + a[8] * b[8],
+    )
+
+
+@inline_kernel
+def full(m):
+    """A symmetric 6-tuple as a 9-tuple."""
+    return m[0], m[1], m[2], m[1], m[3], m[4], m[2], m[4], m[5]
+
+
+@inline_kernel
+def rotated_inertia(R, m):
+    """The symmetric matrix R m R^T, m a symmetric 6-tuple."""
+    a = product(R, full(m))
+    return (
+        a[0] * R[0] + a[1] * R[1] + a[2] * R[2],
+        a[0] * R[3] + a[1] * R[4] + a[2] * R[5],
+        a[0] * R[6] + a[1] * R[7] + a[2] * R[8],
+        a[3] * R[3] + a[4] * R[4] + a[5] * R[5],
+        a[3] * R[6] + a[4] * R[7] + a[5] * R[8],
+        a[6] * R[6] + a[7] * R[7] + a[8] * R[8],
+    )
+
+
+@inline_kernel
+def symmetric_inverse(m):
+    """The inverse of a symmetric 6-tuple by cofactors."""
+    c0 = m[3] * m[5] - m[4] * m[4]
+    c1 = m[2] * m[4] - m[1] * m[5]
+    c2 = m[1] * m[4] - m[2] * m[3]
+    d = 1.0 / (m[0] * c0 + m[1] * c1 + m[2] * c2)
+    return (
+        c0 * d,
+        c1 * d,
+        c2 * d,
+        (m[0] * m[5] - m[2] * m[2]) * d,
+        (m[1] * m[2] - m[0] * m[4]) * d,
+        (m[0] * m[3] - m[1] * m[1]) * d,
+    )
+
+
+@inline_kernel
+def solve3(m, u):
+    """The solution x of m x = u for a 3x3 matrix (9-tuple) by cofactors."""
+    c0 = m[4] * m[8] - m[5] * m[7]
+    c1 = m[5] * m[6] - m[3] * m[8]
+    c2 = m[3] * m[7] - m[4] * m[6]
+    d = 1.0 / (m[0] * c0 + m[1] * c1 + m[2] * c2)
+    return (
+        (c0 * u[0] + (m[2] * m[7] - m[1] * m[8]) * u[1] + (m[1] * m[5] - m[2] * m[4]) * u[2]) * d,
+        (c1 * u[0] + (m[0] * m[8] - m[2] * m[6]) * u[1] + (m[2] * m[3] - m[0] * m[5]) * u[2]) * d,
+        (c2 * u[0] + (m[1] * m[6] - m[0] * m[7]) * u[1] + (m[0] * m[4] - m[1] * m[3]) * u[2]) * d,
+    )
+
+
+@inline_kernel
+def rotation_about(axis, angle):
+    """The rotation matrix by angle about a unit axis (Rodrigues)."""
+    s, c = math.sin(angle), math.cos(angle)
+    k = 1.0 - c
+    x, y, z = axis
+    return (
+        c + k * x * x,
+        k * x * y - s * z,
+        k * x * z + s * y,
+        k * x * y + s * z,
+        c + k * y * y,
+        k * y * z - s * x,
+        k * x * z - s * y,
+        k * y * z + s * x,
+        c + k * z * z,
+    )
+
+
+@inline_kernel
+def rotation_of(w, x, y, z):
+    """The rotation matrix of a unit quaternion (design eq. 1, the element (1, 3) corrected)."""
+    return (
+        1.0 - 2.0 * (y * y + z * z),
+        2.0 * (x * y - w * z),
+        2.0 * (x * z + w * y),
+        2.0 * (x * y + w * z),
+        1.0 - 2.0 * (x * x + z * z),
+        2.0 * (y * z - w * x),
+        2.0 * (x * z - w * y),
+        2.0 * (y * z + w * x),
+        1.0 - 2.0 * (x * x + y * y),
+    )

@@ -1,0 +1,360 @@
+"""Forward dynamics by articulated bodies: what a force does to the whole tree, in time linear in its links.
+
+Source: Featherstone 2008, ch. 7. World axes, each link about its own joint: articulated inertias shift but never
+rotate. A ball joint passes only a force and a 3x3 articulated mass to its parent; a free root is solved as a block.
+The inertias (``factorize``) and what runs through them (``accelerate``) are separate, because unit forces of
+constraints, projections and derivatives run through the same factors.
+"""
+
+from physics_prior.dynamics.algebra import (
+    ZERO,
+    cross,
+    dot,
+    get3,
+    get6,
+    get9,
+    minus,
+    plus,
+    put3,
+    put6,
+    put9,
+    scale,
+    symmetric_inverse,
+    symmetric_times,
+    times,
+    transposed_times,
+)
+from physics_prior.dynamics.kernel import inline_kernel, kernel
+from physics_prior.dynamics.records import FREE, PRISMATIC, REVOLUTE
+
+
+@inline_kernel
+def shift_to_parent(up, arm, J, H, M):
+    """Add an articulated inertia about a joint to the parent link's, whose origin is ``arm`` before it."""
+    x, y, z = arm
+    m0, m1, m2, m3, m4, m5 = M
+    # S = [arm]x M
+    s0, s1, s2 = y * m2 - z * m1, y * m4 - z * m3, y * m5 - z * m4
+    s3, s4, s5 = z * m0 - x * m2, z * m1 - x * m4, z * m2 - x * m5
+    s6, s7, s8 = x * m1 - y * m0, x * m3 - y * m1, x * m4 - y * m2
+    # B = [arm]x H^T, so that the shifted J is J + B + B^T - S [arm]x
+    b0, b1, b2 = y * H[2] - z * H[1], y * H[5] - z * H[4], y * H[8] - z * H[7]
+    b3, b4, b5 = z * H[0] - x * H[2], z * H[3] - x * H[5], z * H[6] - x * H[8]
+    b6, b7, b8 = x * H[1] - y * H[0], x * H[4] - y * H[3], x * H[7] - y * H[6]
+    up.J[0] += J[0] + 2.0 * b0 - (s1 * z - s2 * y)
+    up.J[1] += J[1] + b1 + b3 - (s2 * x - s0 * z)
+    up.J[2] += J[2] + b2 + b6 - (s0 * y - s1 * x)
+    up.J[3] += J[3] + 2.0 * b4 - (s5 * x - s3 * z)
+    up.J[4] += J[4] + b5 + b7 - (s3 * y - s4 * x)
+    up.J[5] += J[5] + 2.0 * b8 - (s6 * y - s7 * x)
+    up.H[0] += H[0] + s0
+    up.H[1] += H[1] + s1
+    up.H[2] += H[2] + s2
+    up.H[3] += H[3] + s3
+    up.H[4] += H[4] + s4
+    up.H[5] += H[5] + s5
+    up.H[6] += H[6] + s6
+    up.H[7] += H[7] + s7
+    up.H[8] += H[8] + s8
+    for k in range(6):
+        up.M[k] += M[k]
+
+
+@inline_kernel
+def _schur(M, H, K):
+    """The symmetric matrix M - H^T K, K = J^-1 H: the mass felt through a ball joint."""
+    return (
+        M[0] - (H[0] * K[0] + H[3] * K[3] + H[6] * K[6]),
+        M[1] - (H[0] * K[1] + H[3] * K[4] + H[6] * K[7]),
+        M[2] - (H[0] * K[2] + H[3] * K[5] + H[6] * K[8]),
+        M[3] - (H[1] * K[1] + H[4] * K[4] + H[7] * K[7]),
+        M[4] - (H[1] * K[2] + H[4] * K[5] + H[7] * K[8]),
+        M[5] - (H[2] * K[2] + H[5] * K[5] + H[8] * K[8]),
+    )
+
+
+@inline_kernel
+def _symmetric_product(a, h):
+    """The product of a symmetric 6-tuple and a 9-tuple."""
+    return (
+        a[0] * h[0] + a[1] * h[3] + a[2] * h[6],
+        a[0] * h[1] + a[1] * h[4] + a[2] * h[7],
+        a[0] * h[2] + a[1] * h[5] + a[2] * h[8],
+        a[1] * h[0] + a[3] * h[3] + a[4] * h[6],
+        a[1] * h[1] + a[3] * h[4] + a[4] * h[7],
+        a[1] * h[2] + a[3] * h[5] + a[4] * h[8],
+        a[2] * h[0] + a[4] * h[3] + a[5] * h[6],
+        a[2] * h[1] + a[4] * h[4] + a[5] * h[7],
+        a[2] * h[2] + a[4] * h[5] + a[5] * h[8],
+    )
+
+
+@inline_kernel
+def rigid_inertias(links, work):
+    """Fill J, H and M of every link with those of the rigid link about its own joint; needs the kinematics."""
+    for i in range(links.shape[0]):
+        here = work[i]
+        m = links[i].mass
+        x, y, z = get3(here.center)
+        c = get6(here.inertia)
+        put6(
+            here.J,
+            (
+                c[0] + m * (y * y + z * z),
+                c[1] - m * x * y,
+                c[2] - m * x * z,
+                c[3] + m * (x * x + z * z),
+                c[4] - m * y * z,
+                c[5] + m * (x * x + y * y),
+            ),
+        )
+        put9(here.H, (0.0, -m * z, m * y, m * z, 0.0, -m * x, -m * y, m * x, 0.0))
+        put6(here.M, (m, 0.0, 0.0, m, 0.0, m))
+
+
+@kernel
+def factorize(links, work):
+    """Fill the articulated inertias of all links, inward; needs the kinematics."""
+    rigid_inertias(links, work)
+    for i in range(links.shape[0] - 1, -1, -1):
+        link, here = links[i], work[i]
+        J, H, M = get6(here.J), get9(here.H), get6(here.M)
+        if link.kind == REVOLUTE or link.kind == PRISMATIC:
+            s = get3(here.axis)
+            if link.kind == REVOLUTE:
+                n, f = symmetric_times(J, s), transposed_times(H, s)
+                inverse = 1.0 / dot(s, n)
+            else:
+                n, f = times(H, s), symmetric_times(M, s)
+                inverse = 1.0 / dot(s, f)
+            put3(here.U_moment, n)
+            put3(here.U_force, f)
+            here.D = inverse
+            if link.parent >= 0:
+                a, b = scale(inverse, n), scale(inverse, f)
+                J = (
+                    J[0] - a[0] * n[0],
+                    J[1] - a[0] * n[1],
+                    J[2] - a[0] * n[2],
+                    J[3] - a[1] * n[1],
+                    J[4] - a[1] * n[2],
+                    J[5] - a[2] * n[2],
+                )
+                M = (
+                    M[0] - b[0] * f[0],
+                    M[1] - b[0] * f[1],
+                    M[2] - b[0] * f[2],
+                    M[3] - b[1] * f[1],
+                    M[4] - b[1] * f[2],
+                    M[5] - b[2] * f[2],
+                )
+                H = (
+                    H[0] - a[0] * f[0],
+                    H[1] - a[0] * f[1],
+                    H[2] - a[0] * f[2],
+                    H[3] - a[1] * f[0],
+                    H[4] - a[1] * f[1],
+                    H[5] - a[1] * f[2],
+                    H[6] - a[2] * f[0],
+                    H[7] - a[2] * f[1],
+                    H[8] - a[2] * f[2],
+                )
+        else:
+            inverse = symmetric_inverse(J)
+            put6(here.J_inverse, inverse)
+            K = _symmetric_product(inverse, H)
+            put9(here.K, K)
+            M = _schur(M, H, K)
+            J = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            H = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            if link.kind == FREE:
+                put6(here.M_inverse, symmetric_inverse(M))
+        # the reduced inertia, which is what the parent feels and what the bias runs through
+        put6(here.J, J)
+        put9(here.H, H)
+        put6(here.M, M)
+        if link.parent >= 0:
+            shift_to_parent(work[link.parent], get3(here.arm), J, H, M)
+
+
+@kernel
+def accelerate(links, work, tau, gravity, vdot):
+    """Fill vdot (nv,) from generalized forces tau (nv,), external wrenches, velocities and gravity (3,).
+
+    Needs ``move`` and ``factorize``. Spherical entries of tau and vdot are in the link's axes, the linear ones of a free
+    joint in the world's. Leaves alpha and acceleration (less gravity) of every link in the workspace.
+    """
+    for i in range(links.shape[0]):
+        here = work[i]
+        omega, center = get3(here.omega), get3(here.center)
+        force = scale(links[i].mass, cross(omega, cross(omega, center)))
+        put3(here.bias_moment, minus(plus(get3(here.gyroscopic), cross(center, force)), get3(here.moment)))
+        put3(here.bias_force, minus(force, get3(here.force)))
+    for i in range(links.shape[0] - 1, -1, -1):
+        link, here = links[i], work[i]
+        moment, force = get3(here.bias_moment), get3(here.bias_force)
+        n = link.v
+        if link.kind == REVOLUTE or link.kind == PRISMATIC:
+            u = tau[n] - dot(get3(here.axis), moment if link.kind == REVOLUTE else force)
+            here.u[0] = u
+            if link.parent >= 0:
+                share = u * here.D
+                moment = plus(moment, scale(share, get3(here.U_moment)))
+                force = plus(force, scale(share, get3(here.U_force)))
+        else:
+            first = n + 3 if link.kind == FREE else n
+            torque = times(get9(here.rotation), (tau[first], tau[first + 1], tau[first + 2]))
+            u = minus(torque, moment)
+            put3(here.u, u)
+            moment = torque
+            force = plus(force, transposed_times(get9(here.K), u))
+            if link.kind == FREE:
+                put3(here.bias_force, minus((tau[n], tau[n + 1], tau[n + 2]), force))
+        if link.parent >= 0:
+            angular, linear = get3(here.coriolis_angular), get3(here.coriolis_linear)
+            H = get9(here.H)
+            moment = plus(moment, plus(symmetric_times(get6(here.J), angular), times(H, linear)))
+            force = plus(force, plus(transposed_times(H, angular), symmetric_times(get6(here.M), linear)))
+            up = work[link.parent]
+            moment = plus(moment, cross(get3(here.arm), force))
+            put3(up.bias_moment, plus(get3(up.bias_moment), moment))
+            put3(up.bias_force, plus(get3(up.bias_force), force))
+    for i in range(links.shape[0]):
+        link, here = links[i], work[i]
+        alpha, acceleration = ZERO, (-gravity[0], -gravity[1], -gravity[2])
+        if link.parent >= 0:
+            up = work[link.parent]
+            alpha = get3(up.alpha)
+            acceleration = plus(get3(up.acceleration), cross(alpha, get3(here.arm)))
+        acceleration = plus(acceleration, get3(here.coriolis_linear))
+        alpha = plus(alpha, get3(here.coriolis_angular))
+        n = link.v
+        if link.kind == REVOLUTE or link.kind == PRISMATIC:
+            rate = here.D * (here.u[0] - dot(get3(here.U_moment), alpha) - dot(get3(here.U_force), acceleration))
+            vdot[n] = rate
+            if link.kind == REVOLUTE:
+                alpha = plus(alpha, scale(rate, get3(here.axis)))
+            else:
+                acceleration = plus(acceleration, scale(rate, get3(here.axis)))
+        else:
+            if link.kind == FREE:
+                acceleration = symmetric_times(get6(here.M_inverse), get3(here.bias_force))
+                vdot[n] = acceleration[0] + gravity[0]
+                vdot[n + 1] = acceleration[1] + gravity[1]
+                vdot[n + 2] = acceleration[2] + gravity[2]
+                n += 3
+            total = minus(
+                symmetric_times(get6(here.J_inverse), get3(here.u)), times(get9(here.K), acceleration)
+            )
+            local = transposed_times(get9(here.rotation), minus(total, alpha))
+            vdot[n], vdot[n + 1], vdot[n + 2] = local
+            alpha = total
+        put3(here.alpha, alpha)
+        put3(here.acceleration, acceleration)
+
+
+@kernel
+def push(links, work, link_index, point, force, sign, y, z):
+    """Run a force at a world point on a link inward through the factors: add S^T w to y (nv,) and D^-1 S^T w to z (nv,).
+
+    y_r . z_s of two such forces is their entry of A M^-1 A^T. Entries of ball joints are in world axes. The wrench
+    left after a joint moves on to its parent; a force on the world does nothing.
+    """
+    i = link_index
+    if i < 0:
+        return
+    force = scale(sign, force)
+    moment = cross(minus(point, get3(work[i].origin)), force)
+    while i >= 0:
+        link, here = links[i], work[i]
+        n = link.v
+        if link.kind == REVOLUTE or link.kind == PRISMATIC:
+            s = dot(get3(here.axis), moment if link.kind == REVOLUTE else force)
+            y[n] += s
+            share = s * here.D
+            z[n] += share
+            moment = minus(moment, scale(share, get3(here.U_moment)))
+            force = minus(force, scale(share, get3(here.U_force)))
+        else:
+            turn = symmetric_times(get6(here.J_inverse), moment)
+            rest = minus(force, transposed_times(get9(here.K), moment))
+            if link.kind == FREE:
+                shift = symmetric_times(get6(here.M_inverse), rest)
+                for c in range(3):
+                    y[n + c] += rest[c]
+                    z[n + c] += shift[c]
+                n += 3
+            for c in range(3):
+                y[n + c] += moment[c]
+                z[n + c] += turn[c]
+            force, moment = rest, ZERO
+        moment = plus(moment, cross(get3(here.arm), force))
+        i = link.parent
+
+
+@kernel
+def push_generalized(links, work, tau, z):
+    """Run generalized forces tau (nv,) inward through the factors: fill z (nv,) = D^-1 (what is left of them)."""
+    for i in range(links.shape[0]):
+        put3(work[i].delta_alpha, ZERO)  # here: the moment that children pass on
+        put3(work[i].delta_acceleration, ZERO)
+    for i in range(links.shape[0] - 1, -1, -1):
+        link, here = links[i], work[i]
+        moment, force = get3(here.delta_alpha), get3(here.delta_acceleration)
+        n = link.v
+        if link.kind == REVOLUTE or link.kind == PRISMATIC:
+            share = here.D * (tau[n] + dot(get3(here.axis), moment if link.kind == REVOLUTE else force))
+            z[n] = share
+            moment = minus(moment, scale(share, get3(here.U_moment)))
+            force = minus(force, scale(share, get3(here.U_force)))
+        else:
+            first = n + 3 if link.kind == FREE else n
+            torque = times(get9(here.rotation), (tau[first], tau[first + 1], tau[first + 2]))
+            turn = plus(torque, moment)
+            local = symmetric_times(get6(here.J_inverse), turn)
+            for c in range(3):
+                z[first + c] = local[c]
+            force = minus(force, transposed_times(get9(here.K), turn))
+            moment = scale(-1.0, torque)
+            if link.kind == FREE:
+                rest = symmetric_times(
+                    get6(here.M_inverse), plus((tau[n], tau[n + 1], tau[n + 2]), force)
+                )
+                for c in range(3):
+                    z[n + c] = rest[c]
+        if link.parent >= 0:
+            up = work[link.parent]
+            put3(up.delta_alpha, plus(get3(up.delta_alpha), plus(moment, cross(get3(here.arm), force))))
+            put3(up.delta_acceleration, plus(get3(up.delta_acceleration), force))
+
+
+@kernel
+def pull(links, work, z, vdot):
+    """Run z (nv,) outward through the factors: fill vdot (nv,) = M^-1 tau, and the links' increments of acceleration."""
+    for i in range(links.shape[0]):
+        link, here = links[i], work[i]
+        alpha, acceleration = ZERO, ZERO
+        if link.parent >= 0:
+            up = work[link.parent]
+            alpha = get3(up.delta_alpha)
+            acceleration = plus(get3(up.delta_acceleration), cross(alpha, get3(here.arm)))
+        n = link.v
+        if link.kind == REVOLUTE or link.kind == PRISMATIC:
+            rate = z[n] - here.D * (dot(get3(here.U_moment), alpha) + dot(get3(here.U_force), acceleration))
+            vdot[n] = rate
+            if link.kind == REVOLUTE:
+                alpha = plus(alpha, scale(rate, get3(here.axis)))
+            else:
+                acceleration = plus(acceleration, scale(rate, get3(here.axis)))
+        else:
+            if link.kind == FREE:
+                acceleration = (z[n], z[n + 1], z[n + 2])
+                vdot[n], vdot[n + 1], vdot[n + 2] = acceleration
+                n += 3
+            total = minus((z[n], z[n + 1], z[n + 2]), times(get9(here.K), acceleration))
+            vdot[n], vdot[n + 1], vdot[n + 2] = transposed_times(
+                get9(here.rotation), minus(total, alpha)
+            )
+            alpha = total
+        put3(here.delta_alpha, alpha)
+        put3(here.delta_acceleration, acceleration)

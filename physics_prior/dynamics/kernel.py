@@ -1,0 +1,62 @@
+"""How kernels are compiled and cached: Numba, on disk, keyed by a digest of everything that goes into them."""
+
+import hashlib
+import os
+import platform
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import llvmlite
+import numba
+import numpy as np
+
+FASTMATH = {"nsz", "arcp", "contract", "reassoc", "afn"}
+"""Everything but nnan and ninf: a NaN stays visible."""
+
+_KERNEL_ROOMS = ("dynamics", "effects", "estimation")
+
+
+@cache
+def cache_directory() -> Path:
+    """Where compiled kernels of exactly these sources and versions live.
+
+    Numba does not notice an edit in another module that was inlined, so a stale cache would be silently wrong: the
+    folder's name is a digest of all sources that hold kernels, the versions of the compilers and the machine. The
+    environment variable PHYSICS_PRIOR_CACHE names another place.
+    """
+    digest = hashlib.sha256()
+    package = Path(__file__).resolve().parents[1]
+    for room in _KERNEL_ROOMS:
+        for source in sorted((package / room).rglob("*.py")):
+            digest.update(source.read_bytes())
+    for version in (numba.__version__, llvmlite.__version__, np.__version__, platform.python_version()):
+        digest.update(version.encode())
+    digest.update(f"{numba.config.CPU_NAME} {platform.machine()} {platform.processor()}".encode())
+    home = os.environ.get("PHYSICS_PRIOR_CACHE") or str(
+        Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "physics_prior"
+    )
+    return Path(home) / digest.hexdigest()[:16]
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function of the step: no Python in it, cached on disk, IEEE division, NaN visible."""
+    return _compile(function, inline=False)
+
+
+def inline_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a small helper (3-vector algebra) that the optimiser is told to inline."""
+    return _compile(function, inline=True)
+
+
+def _compile(function: Callable[..., Any], inline: bool) -> Any:
+    # Numba reads its cache directory when it decorates: set it for our functions only
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(cache_directory())
+    try:
+        return numba.njit(
+            cache=True, error_model="numpy", fastmath=FASTMATH, forceinline=inline, boundscheck=False
+        )(function)
+    finally:
+        numba.config.CACHE_DIR = before

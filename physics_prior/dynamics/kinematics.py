@@ -1,0 +1,125 @@
+"""Kinematics: where every link is, how it moves and what its velocity alone adds to its acceleration."""
+
+from physics_prior.dynamics.algebra import (
+    IDENTITY,
+    ZERO,
+    cross,
+    get3,
+    get6,
+    get9,
+    minus,
+    plus,
+    product,
+    put3,
+    put6,
+    put9,
+    rotated_inertia,
+    rotation_about,
+    rotation_of,
+    scale,
+    symmetric_times,
+    times,
+)
+from physics_prior.dynamics.kernel import inline_kernel, kernel
+from physics_prior.dynamics.records import FREE, PRISMATIC, REVOLUTE, SPHERICAL
+
+
+@kernel
+def move(links, work, q, v):
+    """Fill poses, velocities and velocity-product accelerations of all links from q (nq,) and v (nv,), outward.
+
+    World axes throughout, each link about its own joint, so that inertias shift but never rotate. External forces are
+    set to zero. Source: Featherstone 2008, ch. 4, with accelerations of points instead of spatial ones.
+    """
+    for i in range(links.shape[0]):
+        link, here = links[i], work[i]
+        R, origin, omega, velocity = IDENTITY, ZERO, ZERO, ZERO
+        if link.parent >= 0:
+            up = work[link.parent]
+            R, origin = get9(up.rotation), get3(up.origin)
+            omega, velocity = get3(up.omega), get3(up.velocity)
+        arm = times(R, get3(link.position))
+        R = product(R, get9(link.placement))
+        angular = ZERO
+        linear = cross(omega, cross(omega, arm))
+        spin = ZERO
+        slide = ZERO
+        k, n = link.q, link.v
+        if link.kind == REVOLUTE:
+            R = product(R, rotation_about(get3(link.axis), q[k]))
+            axis = times(R, get3(link.axis))
+            put3(here.axis, axis)
+            spin = scale(v[n], axis)
+            angular = cross(omega, spin)
+        elif link.kind == PRISMATIC:
+            axis = times(R, get3(link.axis))
+            put3(here.axis, axis)
+            arm = plus(arm, scale(q[k], axis))
+            slide = scale(v[n], axis)
+            linear = plus(cross(omega, cross(omega, arm)), scale(2.0, cross(omega, slide)))
+        elif link.kind == SPHERICAL:
+            R = product(R, rotation_of(q[k], q[k + 1], q[k + 2], q[k + 3]))
+            spin = times(R, (v[n], v[n + 1], v[n + 2]))
+            angular = cross(omega, spin)
+        elif link.kind == FREE:
+            arm = (q[k], q[k + 1], q[k + 2])
+            R = rotation_of(q[k + 3], q[k + 4], q[k + 5], q[k + 6])
+            slide = (v[n], v[n + 1], v[n + 2])
+            spin = times(R, (v[n + 3], v[n + 4], v[n + 5]))
+        put9(here.rotation, R)
+        put3(here.arm, arm)
+        put3(here.origin, plus(origin, arm))
+        put3(here.velocity, plus(plus(velocity, cross(omega, arm)), slide))
+        omega = plus(omega, spin)
+        put3(here.omega, omega)
+        put3(here.coriolis_angular, angular)
+        put3(here.coriolis_linear, linear)
+        put3(here.center, times(R, get3(link.center)))
+        inertia = rotated_inertia(R, get6(link.inertia))
+        put6(here.inertia, inertia)
+        put3(here.gyroscopic, cross(omega, symmetric_times(inertia, omega)))
+        put3(here.moment, ZERO)
+        put3(here.force, ZERO)
+
+
+@inline_kernel
+def freedoms(kind):
+    """Number of degrees of freedom of a joint."""
+    return 1 if kind == REVOLUTE or kind == PRISMATIC else (6 if kind == FREE else 3)
+
+
+@inline_kernel
+def freedom(kind, here, c):
+    """The c-th direction of motion of a joint: angular velocity and velocity of its origin, world axes, per unit of v."""
+    turn, shift = ZERO, ZERO
+    if kind == REVOLUTE:
+        turn = get3(here.axis)
+    elif kind == PRISMATIC:
+        shift = get3(here.axis)
+    elif kind == FREE and c < 3:
+        shift = (1.0 if c == 0 else 0.0, 1.0 if c == 1 else 0.0, 1.0 if c == 2 else 0.0)
+    else:
+        k = c - 3 if kind == FREE else c
+        turn = (here.rotation[k], here.rotation[3 + k], here.rotation[6 + k])
+    return turn, shift
+
+
+@kernel
+def point_jacobian(links, work, link_index, point, jacobian):
+    """Fill jacobian (6, nv): angular velocity (rows 0-2) and velocity of a point (rows 3-5), world axes, per v.
+
+    point (3,) stands in the link's frame, m. Columns of joints that do not carry the link are zero.
+    """
+    jacobian[:, :] = 0.0
+    i = link_index
+    if i < 0:
+        return
+    target = plus(get3(work[i].origin), times(get9(work[i].rotation), get3(point)))
+    while i >= 0:
+        link, here = links[i], work[i]
+        lever = minus(target, get3(here.origin))
+        for c in range(freedoms(link.kind)):
+            turn, shift = freedom(link.kind, here, c)
+            put3(jacobian[0:3, link.v + c], turn)
+            put3(jacobian[3:6, link.v + c], plus(shift, cross(turn, lever)))
+        i = link.parent

@@ -1,0 +1,177 @@
+"""The manifold of configurations, compiled: the exponential map and the derivatives that a step needs.
+
+Tangent vectors (nv,) stand to the right of q, as Tree.integrate does: q [+] delta. Within a step the motion is written in
+the coordinates theta of q = q0 [+] theta (Munthe-Kaas 1999), a plain vector space in which RK4 keeps its order.
+"""
+
+import math
+
+from physics_prior.dynamics.algebra import cross, plus, scale
+from physics_prior.dynamics.kernel import inline_kernel, kernel
+from physics_prior.dynamics.records import FREE, SPHERICAL
+
+
+@inline_kernel
+def exponential(x, y, z):
+    """The unit quaternion of a rotation vector, safe at zero."""
+    square = x * x + y * y + z * z
+    if square < 1e-8:
+        # sin(a/2)/a and cos(a/2) to the sixth order
+        s = 0.5 - square / 48.0 + square * square / 3840.0
+        return 1.0 - square / 8.0 + square * square / 384.0, s * x, s * y, s * z
+    angle = math.sqrt(square)
+    s = math.sin(0.5 * angle) / angle
+    return math.cos(0.5 * angle), s * x, s * y, s * z
+
+
+@inline_kernel
+def _skew_polynomial(theta, first, second):
+    """The matrix I + first [theta]x + second [theta]x^2."""
+    x, y, z = theta
+    return (
+        1.0 - second * (y * y + z * z),
+        -first * z + second * x * y,
+        first * y + second * x * z,
+        first * z + second * x * y,
+        1.0 - second * (x * x + z * z),
+        -first * x + second * y * z,
+        -first * y + second * x * z,
+        first * x + second * y * z,
+        1.0 - second * (x * x + y * y),
+    )
+
+
+@inline_kernel
+def rotation_back(theta):
+    """The matrix exp(theta)^T: how an error before a turn by theta reads after it."""
+    square = theta[0] * theta[0] + theta[1] * theta[1] + theta[2] * theta[2]
+    if square < 1e-8:
+        return _skew_polynomial(theta, -1.0 + square / 6.0, 0.5 - square / 24.0)
+    angle = math.sqrt(square)
+    return _skew_polynomial(theta, -math.sin(angle) / angle, (1.0 - math.cos(angle)) / square)
+
+
+@inline_kernel
+def right_jacobian(theta):
+    """The right Jacobian of the exponential map (Sola 2017, eq. 183)."""
+    square = theta[0] * theta[0] + theta[1] * theta[1] + theta[2] * theta[2]
+    if square < 1e-6:
+        return _skew_polynomial(theta, -0.5 + square / 24.0, 1.0 / 6.0 - square / 120.0)
+    angle = math.sqrt(square)
+    return _skew_polynomial(
+        theta, -(1.0 - math.cos(angle)) / square, (angle - math.sin(angle)) / (square * angle)
+    )
+
+
+@inline_kernel
+def local_rate(theta, omega):
+    """The rate of the rotation vector theta under body angular velocity omega, to the order RK4 needs.
+
+    theta_dot = omega + 1/2 theta x omega + 1/12 theta x (theta x omega): the inverse right Jacobian, next term O(theta^4).
+    """
+    once = cross(theta, omega)
+    return plus(omega, plus(scale(0.5, once), scale(1.0 / 12.0, cross(theta, once))))
+
+
+@inline_kernel
+def local_rate_by_theta(theta, omega, direction):
+    """The derivative of local_rate by theta along a direction."""
+    once = cross(theta, omega)
+    turned = cross(direction, omega)
+    return plus(
+        scale(0.5, turned), scale(1.0 / 12.0, plus(cross(direction, once), cross(theta, turned)))
+    )
+
+
+@kernel
+def displace(links, q, delta, out):
+    """Fill out (nq,) = q [+] delta; q and out may be the same array. Quaternions leave with unit norm."""
+    for i in range(links.shape[0]):
+        link = links[i]
+        k, n = link.q, link.v
+        if link.kind == SPHERICAL or link.kind == FREE:
+            if link.kind == FREE:
+                for c in range(3):
+                    out[k + c] = q[k + c] + delta[n + c]
+                k, n = k + 3, n + 3
+            w, x, y, z = q[k], q[k + 1], q[k + 2], q[k + 3]
+            a, b, c, d = exponential(delta[n], delta[n + 1], delta[n + 2])
+            out0 = w * a - x * b - y * c - z * d
+            out1 = w * b + x * a + y * d - z * c
+            out2 = w * c - x * d + y * a + z * b
+            out3 = w * d + x * c - y * b + z * a
+            norm = 1.0 / math.sqrt(out0 * out0 + out1 * out1 + out2 * out2 + out3 * out3)
+            out[k], out[k + 1], out[k + 2], out[k + 3] = out0 * norm, out1 * norm, out2 * norm, out3 * norm
+        else:
+            out[k] = q[k] + delta[n]
+
+
+@kernel
+def rate(links, theta, v, out):
+    """Fill out (nv,): the rate of the local coordinates theta (nv,) under velocity v (nv,)."""
+    for i in range(links.shape[0]):
+        link = links[i]
+        n = link.v
+        if link.kind == SPHERICAL or link.kind == FREE:
+            if link.kind == FREE:
+                for c in range(3):
+                    out[n + c] = v[n + c]
+                n += 3
+            out[n], out[n + 1], out[n + 2] = local_rate(
+                (theta[n], theta[n + 1], theta[n + 2]), (v[n], v[n + 1], v[n + 2])
+            )
+        else:
+            out[n] = v[n]
+
+
+@kernel
+def rate_derivative(links, theta, v, theta_x, v_x, out):
+    """Fill out (nv, k): the derivative of ``rate`` from those of theta and v, (nv, k) each."""
+    columns = out.shape[1]
+    for i in range(links.shape[0]):
+        link = links[i]
+        n = link.v
+        if link.kind == SPHERICAL or link.kind == FREE:
+            if link.kind == FREE:
+                for c in range(3):
+                    for j in range(columns):
+                        out[n + c, j] = v_x[n + c, j]
+                n += 3
+            angle, omega = (theta[n], theta[n + 1], theta[n + 2]), (v[n], v[n + 1], v[n + 2])
+            for j in range(columns):
+                by_theta = local_rate_by_theta(
+                    angle, omega, (theta_x[n, j], theta_x[n + 1, j], theta_x[n + 2, j])
+                )
+                by_v = local_rate(angle, (v_x[n, j], v_x[n + 1, j], v_x[n + 2, j]))
+                for c in range(3):
+                    out[n + c, j] = by_theta[c] + by_v[c]
+        else:
+            for j in range(columns):
+                out[n, j] = v_x[n, j]
+
+
+@kernel
+def displacement_derivative(links, theta, start_x, theta_x, out):
+    """Fill out (nv, k): the tangent error at q0 [+] theta from those of q0 and theta, (nv, k) each."""
+    columns = out.shape[1]
+    for i in range(links.shape[0]):
+        link = links[i]
+        n = link.v
+        if link.kind == SPHERICAL or link.kind == FREE:
+            if link.kind == FREE:
+                for c in range(3):
+                    for j in range(columns):
+                        out[n + c, j] = start_x[n + c, j] + theta_x[n + c, j]
+                n += 3
+            angle = (theta[n], theta[n + 1], theta[n + 2])
+            back, jacobian = rotation_back(angle), right_jacobian(angle)
+            for j in range(columns):
+                for r in range(3):
+                    total = 0.0
+                    for c in range(3):
+                        total += back[3 * r + c] * start_x[n + c, j]
+                        total += jacobian[3 * r + c] * theta_x[n + c, j]
+                    out[n + r, j] = total
+        else:
+            for j in range(columns):
+                out[n, j] = start_x[n, j] + theta_x[n, j]

@@ -1,0 +1,118 @@
+"""The model and the workspace as arrays of records: what the kernels read and write, one record a link."""
+
+import numpy as np
+
+from physics_prior import rotations
+from physics_prior.effects.effect import Anchor, PointPair
+from physics_prior.model import JointKind, Tree
+
+REVOLUTE, PRISMATIC, SPHERICAL, FREE = (int(kind) for kind in JointKind if kind is not JointKind.FIXED)
+
+LINK = np.dtype(
+    [
+        ("parent", "i8"),  # index of the parent link, -1 for the world
+        ("kind", "i8"),  # JointKind
+        ("q", "i8"),  # first coordinate in q
+        ("v", "i8"),  # first degree of freedom in v
+        ("axis", "f8", 3),  # joint axis in the link frame
+        ("position", "f8", 3),  # joint in the parent link's frame, m
+        ("placement", "f8", 9),  # rotation matrix, link to parent link at zero
+        ("mass", "f8"),  # kg
+        ("center", "f8", 3),  # centre of mass in the link frame, m
+        ("inertia", "f8", 6),  # about the centre of mass, link axes: xx xy xz yy yz zz, kg m^2
+    ],
+    align=True,
+)
+"""One moving part of the model; constant while a scene runs."""
+
+WORK = np.dtype(
+    [
+        ("rotation", "f8", 9),  # link to world
+        ("origin", "f8", 3),  # of the link frame (the joint), world, m
+        ("arm", "f8", 3),  # from the parent link's origin to this one, world, m
+        ("axis", "f8", 3),  # joint axis, world
+        ("center", "f8", 3),  # from the origin to the centre of mass, world, m
+        ("omega", "f8", 3),  # angular velocity, world, rad/s
+        ("velocity", "f8", 3),  # of the origin, world, m/s
+        ("coriolis_angular", "f8", 3),  # what velocities alone add to the angular acceleration
+        ("coriolis_linear", "f8", 3),  # ... and to the acceleration of the origin
+        ("inertia", "f8", 6),  # of the link about its centre of mass, world axes
+        ("gyroscopic", "f8", 3),  # torque omega x I omega, or its midpoint form, world
+        ("moment", "f8", 3),  # external moment about the origin, world, N m
+        ("force", "f8", 3),  # external force, world, N
+        ("J", "f8", 6),  # articulated inertia about the origin, world axes: moment per angular acceleration
+        ("H", "f8", 9),  # ... moment per acceleration of the origin
+        ("M", "f8", 6),  # ... force per acceleration of the origin
+        ("bias_moment", "f8", 3),  # articulated bias wrench
+        ("bias_force", "f8", 3),
+        ("U_moment", "f8", 3),  # column of the articulated inertia along the joint axis
+        ("U_force", "f8", 3),
+        ("D", "f8"),  # its entry along the axis, inverted
+        ("J_inverse", "f8", 6),  # of spherical and free joints
+        ("K", "f8", 9),  # J^-1 H
+        ("M_inverse", "f8", 6),  # of a free joint: inverse of M - H^T J^-1 H
+        ("u", "f8", 3),  # joint force left over for acceleration (scalar joints use u[0])
+        ("alpha", "f8", 3),  # angular acceleration, world, rad/s^2
+        ("acceleration", "f8", 3),  # of the origin minus gravity, world, m/s^2
+        ("delta_alpha", "f8", 3),  # the same of an increment (constraint forces, projections)
+        ("delta_acceleration", "f8", 3),
+    ],
+    align=True,
+)
+"""What the kernels compute for one link."""
+
+PAIR = np.dtype(
+    [
+        ("link_a", "i8"),  # -1 for the world
+        ("link_b", "i8"),
+        ("rows", "i8"),  # 1..3
+        ("first", "i8"),  # its first row
+        ("is_rod", "i8"),
+        ("length", "f8"),  # of a rod, m
+        ("point_a", "f8", 3),  # in link a's frame, m
+        ("point_b", "f8", 3),
+        ("directions", "f8", 9),  # rows of unit vectors in link a's frame
+        ("a", "f8", 3),  # point a, world, m
+        ("b", "f8", 3),
+        ("d", "f8", 9),  # rows of unit vectors, world
+        ("force", "f8", 3),  # of the constraint ON link b at point b, world, N
+    ],
+    align=True,
+)
+"""One point pair: its constants and what the kernels compute for it."""
+
+
+def link_records(tree: Tree) -> np.ndarray:
+    """The tree's moving parts as LINK records (N,)."""
+    records = np.zeros(len(tree.links), dtype=LINK)
+    for record, link in zip(records, tree.links, strict=True):
+        inertia = link.mass_properties.inertia
+        record["parent"], record["kind"] = link.parent, int(link.joint.kind)
+        record["q"], record["v"] = link.q.start, link.v.start
+        record["axis"], record["position"] = link.joint.axis, link.joint.position
+        record["placement"] = rotations.matrix_from_quaternion(link.joint.orientation).ravel()
+        record["mass"], record["center"] = link.mass_properties.mass, link.mass_properties.center_of_mass
+        record["inertia"] = inertia[np.triu_indices(3)]
+    return records
+
+
+def pair_records(tree: Tree, pairs: list[PointPair]) -> np.ndarray:
+    """Point pairs as PAIR records (P,), rows numbered in order."""
+    records = np.zeros(len(pairs), dtype=PAIR)
+    first = 0
+    for record, pair in zip(records, pairs, strict=True):
+        rows = 1 if pair.length is not None else len(pair.directions)
+        link_a, record["point_a"], R = _on_link(tree, pair.a)
+        link_b, record["point_b"], _ = _on_link(tree, pair.b)
+        record["link_a"], record["link_b"], record["rows"], record["first"] = link_a, link_b, rows, first
+        record["is_rod"], record["length"] = pair.length is not None, pair.length or 0.0
+        record["directions"][: 3 * rows] = (pair.directions[:rows] @ R.T).ravel()
+        first += rows
+    return records
+
+
+def _on_link(tree: Tree, anchor: Anchor) -> tuple[int, np.ndarray, np.ndarray]:
+    """Link index, point in the link's frame and rotation part to link of an anchor."""
+    frame = tree.frame(anchor.part)
+    R = rotations.matrix_from_quaternion(frame.orientation)
+    return frame.link, frame.position + R @ anchor.point, R

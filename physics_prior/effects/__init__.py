@@ -1,0 +1,13 @@
+"""What acts on the body. One effect a file; a scene pays only for the effects it names."""
+
+from physics_prior.effects.attachment import Attachment, Hinge, Rod, Weld
+from physics_prior.effects.effect import Anchor, CompiledForce, Effect, PointPair
+from physics_prior.effects.gravity import Gravity
+from physics_prior.effects.joint_damping import JointDamping
+
+REGISTRY: dict[str, type[Effect]] = {
+    effect.kind: effect for effect in (Gravity, JointDamping, Attachment, Rod, Hinge, Weld)
+}
+"""Every effect a scene may name, by its key in the scene file."""
+
+__all__ = ["REGISTRY", "Anchor", "CompiledForce", "Effect", "PointPair"]

@@ -1,0 +1,122 @@
+"""Attachments: a point of a part pinned to the world or to another part, or the whole part held."""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from physics_prior import rotations
+from physics_prior.effects.effect import Anchor, Effect, PointPair
+from physics_prior.model import Tree
+
+Vector = tuple[float, float, float]
+
+
+class PinnedEffect(Effect):
+    """What all effects that join two points have in common."""
+
+    part: str = Field(description="the part that is held; the published force acts on it")
+    point: Vector = Field(default=(0.0, 0.0, 0.0), description="m, in the frame of `part`")
+    to: str = Field(default="world", description="what holds it: another part or 'world'")
+    at: Vector = Field(default=(0.0, 0.0, 0.0), description="m, in the frame of `to`")
+
+    def check(self, tree: Tree) -> None:
+        tree.frame(self.part)
+        tree.frame(self.to)
+
+    def anchors(self) -> tuple[Anchor, Anchor]:
+        """The holding point a and the held point b."""
+        return Anchor(self.to, np.array(self.at)), Anchor(self.part, np.array(self.point))
+
+
+class Attachment(PinnedEffect):
+    """A point pinned to a point: a ball joint that closes a loop, a hand on a rail. Three rows."""
+
+    kind: ClassVar[str] = "attachment"
+
+    def explain(self, tree: Tree) -> str:
+        return f"pins a point of {self.part} to {self.to}: 3 rows"
+
+    def point_pairs(self, tree: Tree) -> Sequence[PointPair]:
+        a, b = self.anchors()
+        return (PointPair(a, b, np.eye(3)),)
+
+
+class Rod(PinnedEffect):
+    """A massless rod: two points keep their distance. One row."""
+
+    kind: ClassVar[str] = "rod"
+
+    length: float = Field(gt=0.0, description="m, distance the two points keep")
+
+    def explain(self, tree: Tree) -> str:
+        return f"keeps a point of {self.part} {self.length:.4g} m from {self.to}: 1 row"
+
+    def point_pairs(self, tree: Tree) -> Sequence[PointPair]:
+        a, b = self.anchors()
+        return (PointPair(a, b, np.array([[1.0, 0.0, 0.0]]), self.length),)
+
+
+class Hinge(PinnedEffect):
+    """A hinge that closes a loop: a common point and a common axis. Five rows."""
+
+    kind: ClassVar[str] = "hinge"
+
+    axis: Vector = Field(description="hinge axis in the frame of `part`")
+    to_axis: Vector = Field(description="the same axis in the frame of `to`")
+
+    def explain(self, tree: Tree) -> str:
+        return f"hinges {self.part} to {self.to}: 5 rows"
+
+    def point_pairs(self, tree: Tree) -> Sequence[PointPair]:
+        a, b = self.anchors()
+        along_a, along_b = _unit(self.to_axis), _unit(self.axis)
+        lever = _lever(tree)
+        across = _across(along_a)
+        second = PointPair(
+            Anchor(a.part, a.point + lever * along_a), Anchor(b.part, b.point + lever * along_b), across
+        )
+        return (PointPair(a, b, np.eye(3)), second)
+
+
+class Weld(PinnedEffect):
+    """A part held in place and orientation. Six rows."""
+
+    kind: ClassVar[str] = "weld"
+
+    orientation: tuple[float, float, float, float] = Field(
+        default=(1.0, 0.0, 0.0, 0.0), description="quaternion w, x, y, z: axes of `part` to the frame of `to`"
+    )
+
+    def explain(self, tree: Tree) -> str:
+        return f"welds {self.part} to {self.to}: 6 rows"
+
+    def point_pairs(self, tree: Tree) -> Sequence[PointPair]:
+        a, b = self.anchors()
+        lever = _lever(tree)
+        R = rotations.matrix_from_quaternion(rotations.normalize(np.array(self.orientation)))
+        x, y, z = np.eye(3)
+        return (
+            PointPair(a, b, np.eye(3)),
+            PointPair(Anchor(a.part, a.point + lever * x), Anchor(b.part, b.point + lever * R.T @ x), np.array([y, z])),
+            PointPair(Anchor(a.part, a.point + lever * y), Anchor(b.part, b.point + lever * R.T @ y), np.array([z])),
+        )
+
+
+def _unit(axis: Vector) -> np.ndarray:
+    vector = np.array(axis)
+    return vector / np.linalg.norm(vector)
+
+
+def _across(axis: np.ndarray) -> np.ndarray:
+    """(2, 3) two unit vectors across an axis (3,)."""
+    first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(axis, first)])
+
+
+def _lever(tree: Tree) -> float:
+    """A length typical of the model, m: rows at this lever weigh turning like shifting in the constraint solve."""
+    radii = [np.sqrt(np.trace(k.mass_properties.inertia) / k.mass_properties.mass) for k in tree.links if k.mass_properties.mass]
+    return float(max(np.max(radii), 1e-6)) if radii else 1.0

@@ -1,0 +1,50 @@
+"""Viscous friction in joints."""
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from physics_prior.dynamics.kernel import kernel
+from physics_prior.effects.effect import CompiledForce, Effect
+from physics_prior.errors import ModelError
+from physics_prior.model import JointKind, Tree
+
+
+@kernel
+def apply_joint_damping(parameters, links, work, q, v, tau):
+    """Add tau_k = -d_k v_k; parameters (nv,) are the coefficients d."""
+    for k in range(v.shape[0]):
+        tau[k] -= parameters[k] * v[k]
+
+
+@kernel
+def differentiate_joint_damping(parameters, links, work, q, v, tau_q, tau_v):
+    """Add d tau_k / d v_k = -d_k."""
+    for k in range(v.shape[0]):
+        tau_v[k, k] -= parameters[k]
+
+
+class JointDamping(Effect):
+    """Viscous friction: each named joint resists its own velocity in proportion."""
+
+    kind: ClassVar[str] = "joint_damping"
+    compiled: ClassVar[CompiledForce | None] = CompiledForce(apply_joint_damping, differentiate_joint_damping)
+
+    coefficients: dict[str, Annotated[float, Field(ge=0.0)]] = Field(
+        min_length=1, description="joint name -> N m s/rad (revolute, spherical) or N s/m (prismatic); >= 0"
+    )
+
+    def check(self, tree: Tree) -> None:
+        for joint in self.coefficients:
+            if tree.link(joint).joint.kind is JointKind.FREE:
+                raise ModelError(f"joint '{joint}' is free: joint damping acts in revolute, prismatic and spherical joints")
+
+    def explain(self, tree: Tree) -> str:
+        return "joints resist their velocity: " + ", ".join(f"{j} {c:.3g}" for j, c in self.coefficients.items())
+
+    def parameters(self, tree: Tree) -> np.ndarray:
+        out = np.zeros(tree.nv)
+        for joint, coefficient in self.coefficients.items():
+            out[tree.link(joint).v] = coefficient
+        return out

@@ -30,9 +30,9 @@ class MassProperties:
         inertia: (3, 3) kg m^2, about the CENTRE OF MASS. Zero is a point mass, if the mass is not zero.
 
     Raises:
-        ModelError: a value is not finite or above 1e60; the mass is negative, or zero with an inertia; the inertia is not
-            symmetric, or its principal moments are not those of a body: one is negative, or larger than the
-            sum of the other two (each within 1e-6 of the largest moment).
+        ModelError: a value is not finite or above 1e60; the mass is negative, or zero with an inertia; the
+            inertia is not symmetric, or its principal moments are not those of a body: one is negative, or
+            larger than the sum of the other two (each within 1e-6 of the largest moment).
     """
 
     mass: float
@@ -222,12 +222,13 @@ def _densities(density: Callable[[Array], Array], points: Array) -> Array:
 
 
 def _finite(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """Copy a value into a float array of that shape; ModelError names it if it does not fit (NaN fails too)."""
+    """Copy a value into a float array of that shape; ModelError names it if it does not fit."""
     expected = f"{shape} finite numbers up to 1e60" if shape else "a finite number up to 1e60"
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError):
         raise ModelError(f"{name} {value!r} is not valid: give {expected}") from None
+    # written so that NaN fails too
     if array.shape != shape or not np.all(np.abs(array) <= LARGEST_NUMBER):
         shown = array.tolist() if array.size <= 9 else f"of shape {array.shape}"
         raise ModelError(f"{name} {shown} is not valid: give {expected}")

@@ -51,11 +51,11 @@ def tree_from_urdf(text: str, root: Literal["fixed", "free"] = "fixed") -> Tree:
         for role, link in (("parent", joint.parent), ("child", joint.child)):
             if link not in links:
                 raise ModelError(
-                    f"joint '{joint.name}', <{role} link>: '{link}' is unknown: links are {list(links)}"
+                    f"joint '{joint.name}', <{role} link>: '{link}' is unknown: links are {_shown(links)}"
                 )
     roots = sorted(links.keys() - {joint.child for joint in joints})
     if len(roots) != 1:
-        raise ModelError(f"a URDF needs exactly one link that is no joint's child, but has {roots}")
+        raise ModelError(f"a URDF needs exactly one link that is no joint's child, but has {_shown(roots)}")
     if roots == ["world"]:
         if root != "fixed":
             raise ModelError("root 'free' is not valid: the root link 'world' is the ground and cannot move")
@@ -197,6 +197,12 @@ def _name(element: ElementTree.Element) -> str:
     if not name:
         raise ModelError(f"a <{element.tag}> has no name: every link and joint of a URDF needs one")
     return name
+
+
+def _shown(names: Iterable[str]) -> str:
+    """List names in a message that stays one sentence however many there are."""
+    names = list(names)
+    return f"{names[:20]} and {len(names) - 20} more" if len(names) > 20 else f"{names}"
 
 
 def _refuse_doubles(what: str, names: Iterable[str]) -> None:

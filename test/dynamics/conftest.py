@@ -1,11 +1,14 @@
 """Random models, states and constraints that all tests of dynamics share, as factory fixtures."""
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from physics_prior import rotations
+from physics_prior.dynamics.formulations import generalized
 from physics_prior.effects.effect import Anchor, PointPair
 from physics_prior.inertia import MassProperties
 from physics_prior.model import Joint, JointKind, Part, Tree
@@ -38,8 +41,8 @@ def _random_tree(
     """Build a tree of `size` moving links (1 to 8 if None) and some parts fixed to them.
 
     The first joint is of kind `root` (if None any that moves, free included), later ones of `kinds`; now and
-    then a branch starts on the world. With `massless`, some links between a one-freedom joint and the next have
-    no mass of their own.
+    then a branch starts on the world. With `massless`, some links between a one-freedom joint and the next
+    have no mass of their own.
     """
     size = int(rng.integers(1, 9)) if size is None else size
     parts: list[Part] = []
@@ -129,6 +132,51 @@ def _random_pairs(rng: np.random.Generator, tree: Tree, q: np.ndarray, count: in
     return pairs
 
 
+def _consistent_velocity(tree: Tree, q: np.ndarray, v: np.ndarray, pairs: Sequence[PointPair]) -> np.ndarray:
+    """Velocity (nv,) nearest to v that the point pairs allow at q."""
+    _, J = generalized.constraint_jacobian(tree, q, pairs)
+    return v - np.linalg.pinv(J, rcond=1e-10) @ (J @ v)
+
+
+def _q_rate(tree: Tree, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Time derivative (nq,) of q under v."""
+    rate = np.empty(tree.nq)
+    for link in tree.links:
+        if link.joint.kind in (JointKind.SPHERICAL, JointKind.FREE):
+            start = link.q.stop - 4
+            rate[link.q.start : start] = v[link.v][:-3]
+            rate[start : link.q.stop] = rotations.derivative(q[start : link.q.stop], v[link.v][-3:])
+        else:
+            rate[link.q] = v[link.v]
+    return rate
+
+
+Acceleration = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+def _trajectory(
+    tree: Tree, q: np.ndarray, v: np.ndarray, times: np.ndarray, acceleration: Acceleration
+) -> tuple[np.ndarray, np.ndarray]:
+    """Configurations (times, nq) and velocities (times, nv) from q, v at times[0], by DOP853 at 1e-12."""
+
+    def rate(_: float, y: np.ndarray) -> np.ndarray:
+        q, v = y[: tree.nq], y[tree.nq :]
+        return np.concatenate([_q_rate(tree, q, v), acceleration(q, v)])
+
+    start = np.concatenate([q, v])
+    out = solve_ivp(rate, (times[0], times[-1]), start, method="DOP853", t_eval=times, rtol=1e-12, atol=1e-12)
+    assert out.success
+    return out.y[: tree.nq].T, out.y[tree.nq :].T
+
+
+def _reference(name: str) -> np.ndarray:
+    """Reference trajectory as a record array, by column name; skips the test where it is not at hand."""
+    path = Path(__file__).resolve().parents[2].parent / "shared" / "reference" / name
+    if not path.exists():
+        pytest.skip(f"reference trajectory {name} is missing beside the repository (shared/reference)")
+    return np.genfromtxt(path, delimiter=",", names=True)
+
+
 @pytest.fixture(scope="session")
 def random_tree() -> Callable[..., Tree]:
     """`random_tree(rng, size=None, root=None, massless=False, kinds=MOVING) -> Tree`."""
@@ -145,3 +193,45 @@ def random_state() -> Callable[[np.random.Generator, Tree], tuple[np.ndarray, np
 def random_pairs() -> Callable[[np.random.Generator, Tree, np.ndarray, int], list[PointPair]]:
     """`random_pairs(rng, tree, q, count) -> list[PointPair]`, satisfied at q."""
     return _random_pairs
+
+
+@pytest.fixture(scope="session")
+def consistent_velocity() -> Callable[..., np.ndarray]:
+    """`consistent_velocity(tree, q, v, pairs) -> v`, fulfilling the pairs' rows."""
+    return _consistent_velocity
+
+
+@pytest.fixture(scope="session")
+def trajectory() -> Callable[..., tuple[np.ndarray, np.ndarray]]:
+    """`trajectory(tree, q, v, times, acceleration) -> (q, v)` at those times, by SciPy's DOP853."""
+    return _trajectory
+
+
+@pytest.fixture(scope="session")
+def reference() -> Callable[[str], np.ndarray]:
+    """`reference(name) -> records` of a CSV of shared/reference; skips where it is missing."""
+    return _reference
+
+
+@pytest.fixture(scope="session")
+def double_pendulum() -> Tree:
+    """Two uniform thin rods of 1 m and 1 kg that hang in a row and turn about y; angles from hanging down."""
+    rod = MassProperties(1.0, np.array([0.0, 0.0, -0.5]), np.diag([1.0, 1.0, 0.0]) / 12.0)
+    axis = np.array([0.0, -1.0, 0.0])
+    hook = Joint("shoulder", JointKind.REVOLUTE, "world", "upper", axis=axis)
+    elbow = Joint("elbow", JointKind.REVOLUTE, "upper", "lower", np.array([0.0, 0.0, -1.0]), axis=axis)
+    return Tree([Part("upper", rod), Part("lower", rod)], [hook, elbow])
+
+
+@pytest.fixture(scope="session")
+def heavy_top() -> Tree:
+    """The fast heavy top of Bruels, Cardona and Arnold: 15 kg, 1 m from the fixed point along its axis y."""
+    body = MassProperties(15.0, np.array([0.0, 1.0, 0.0]), np.diag([0.234375, 0.46875, 0.234375]))
+    return Tree([Part("top", body)], [Joint("pivot", JointKind.SPHERICAL, "world", "top")])
+
+
+@pytest.fixture(scope="session")
+def free_top() -> Tree:
+    """A body with principal moments 1, 2 and 3 kg m^2 that nothing holds."""
+    body = MassProperties(1.0, np.zeros(3), np.diag([1.0, 2.0, 3.0]))
+    return Tree([Part("top", body)], [Joint("flight", JointKind.FREE, "world", "top")])

@@ -16,9 +16,9 @@ class ConstrainedMotion:
 
     Attributes:
         acceleration: (nv,) time derivative of v.
-        forces: (pairs, 3) N, ON the part of b of each point pair, at b, world axes; the opposite acts on a's part.
-            Where rank is below the number of rows, the motion and the forces' joint effect are unique, the split
-            is not: this one has the smallest multipliers.
+        forces: (pairs, 3) N, ON the part of b of each point pair, at b, world axes; the opposite acts on a's
+            part. Where rank is below the number of rows, the motion and the forces' joint effect are unique,
+            the split is not: this one has the smallest multipliers.
         rank: number of independent rows among the point pairs' (the joints' rows not counted).
     """
 
@@ -30,16 +30,18 @@ class ConstrainedMotion:
 def solve(
     M: np.ndarray, f: np.ndarray, A: np.ndarray, gamma: np.ndarray, typical_inertia: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Solve [M A^T; A 0] [xddot; lambda] = [f; gamma] (equation 4) and return xddot, lambda and the rank of A.
+    """Solve [M A^T; A 0] [xddot; lambda] = [f; gamma] (equation 4) for xddot (n,), lambda (m,) and rank A.
 
-    M (n, n) may be singular where the constraints hold what has no inertia; A (m, n) may be rank deficient: lambda is
-    then the shortest one, and rows that contradict each other are met in the least-squares sense while M xddot +
-    A^T lambda = f holds exactly. The null-space method: A's singular vectors split the motion into what the
-    constraints prescribe and what they leave free, so that the condition of A is not squared.
+    M (n, n) may be singular where the constraints hold what has no inertia; A (m, n) may be rank deficient:
+    lambda is then the shortest one, and rows that contradict each other are met in the least-squares sense
+    while M xddot + A^T lambda = f holds exactly. The null-space method: A's singular vectors split the motion
+    into what the constraints prescribe and what they leave free, so that the condition of A is not squared.
 
     Args:
-        M, f: mass matrix (n, n) and force (n,).
-        A, gamma: rows (m, n) and their right-hand side (m,), -(d edot/dx) xdot.
+        M: (n, n) mass matrix.
+        f: (n,) force.
+        A: (m, n) rows.
+        gamma: (m,) their right-hand side, -(d edot/dx) xdot.
         typical_inertia: (n,) positive, about what each coordinate moves: it makes kg and kg m^2 comparable.
 
     Raises:

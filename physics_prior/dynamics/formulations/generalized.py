@@ -1,8 +1,8 @@
-"""Generalized coordinates: only the motions that the joints allow (equation 6), loops beside them (equation 7).
+"""Generalized coordinates: only what the joints allow (equation 6), loops beside it (equation 7).
 
-The velocities (v', w') of all bodies are T(u) v, so joints need no multipliers: projecting Newton-Euler on T removes
-what they carry. T is not the Jacobian of coordinates, so its rate is dT/dt and the gyroscopic term -w' x I'w' stands
-in the force.
+The velocities (v, w') of all bodies are T(u) v, so joints need no multipliers: projecting Newton-Euler on T
+removes what they carry. T is not the Jacobian of coordinates, so its rate is dT/dt and the gyroscopic term
+-w' x I'w' stands in the force.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from physics_prior import rotations
 from physics_prior.dynamics.formulations import constrained_motion, point_pairs
 from physics_prior.dynamics.formulations.constrained_motion import ConstrainedMotion
 from physics_prior.dynamics.formulations.kinematics import kinematics
-from physics_prior.dynamics.formulations.newton_euler import Bodies, C, W
+from physics_prior.dynamics.formulations.newton_euler import Bodies, C, Q, W
 from physics_prior.effects.effect import PointPair
 from physics_prior.model import Tree
 
@@ -22,20 +22,20 @@ def mass_matrix(tree: Tree, q: np.ndarray) -> np.ndarray:
     """T^T M T, (nv, nv), at configuration q (nq,)."""
     bodies = Bodies.of(tree)
     T, _ = bodies.velocity_map(kinematics(tree, q, np.zeros(tree.nv)))
-    return T.T @ (bodies.diagonal[:, None] * T)
+    return np.asarray(T.T @ (bodies.diagonal[:, None] * T))
 
 
 def inverse_dynamics(
     tree: Tree, q: np.ndarray, v: np.ndarray, vdot: np.ndarray, gravity: np.ndarray
 ) -> np.ndarray:
-    """Generalized forces tau (nv,) that accelerate the tree by vdot (nv,): equation 6 read from left to right.
+    """Return the forces tau (nv,) that accelerate the tree by vdot (nv,): equation 6 from left to right.
 
     At vdot = 0 they are the bias: Coriolis, centrifugal and gravity terms. gravity: (3,) m/s^2, world.
     """
     bodies = Bodies.of(tree)
     T, Tdot = bodies.velocity_map(kinematics(tree, q, v))
     f = bodies.gravity_and_gyroscopic((T @ v).reshape(-1, 6)[:, 3:], gravity)
-    return T.T @ (bodies.diagonal * (T @ vdot + Tdot @ v) - f)
+    return np.asarray(T.T @ (bodies.diagonal * (T @ vdot + Tdot @ v) - f))
 
 
 def accelerations(
@@ -59,13 +59,13 @@ def mixed_accelerations(
 ) -> ConstrainedMotion:
     """Forward dynamics of a tree with loops and attachments (equation 7).
 
-    (T^T M T) vdot + (A T)^T lambda = tau + T^T (f - M Tdot v) and A T vdot = gamma - A Tdot v, with A and gamma those of
-    the bodies (equation 4), f gravity and the gyroscopic terms.
+    (T^T M T) vdot + (A T)^T lambda = tau + T^T (f - M Tdot v) and A T vdot = gamma - A Tdot v, with A and
+    gamma those of the bodies (equation 4), f gravity and the gyroscopic terms.
 
     Args:
         tree: the model.
-        q, v: configuration (nq,) and velocity (nv,); v should fulfil the constraints, they are held at acceleration
-            level.
+        q: (nq,) configuration.
+        v: (nv,) velocity; it should fulfil the constraints, which are held at acceleration level.
         tau: (nv,) generalized forces.
         gravity: (3,) m/s^2, world axes.
         pairs: the constraints.
@@ -92,8 +92,9 @@ def attach(
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """Velocity after making attachments at once, the impulses that it takes and their rank (equation 9).
 
-    [M A^T; A 0] [v+; L] = [M v-; 0]: the impact is plastic, v+ is the velocity nearest to v- in the mass metric that
-    fulfils the constraints. Returns v+ (nv,), impulses (pairs, 3) N s on b's parts at b, world axes, and the rank.
+    [M A^T; A 0] [v+; L] = [M v-; 0]: the impact is plastic, v+ is the velocity nearest to v- in the mass
+    metric that fulfils the constraints. Returns v+ (nv,), impulses (pairs, 3) N s on b's parts at b, world
+    axes, and the rank.
     """
     bodies = Bodies.of(tree)
     T, _ = bodies.velocity_map(kinematics(tree, q, v))
@@ -108,7 +109,7 @@ def attach(
 def constraint_jacobian(
     tree: Tree, q: np.ndarray, pairs: Sequence[PointPair]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Residual e(q), (rows,) m, of point pairs and its Jacobian A T, (rows, nv): edot = A T v."""
+    """Return the residual e(q), (rows,) m, of point pairs and its Jacobian A T, (rows, nv): edot = A T v."""
     bodies = Bodies.of(tree)
     rest = np.zeros(tree.nv)
     state = bodies.state(q, rest)
@@ -127,7 +128,8 @@ def point_jacobian(tree: Tree, q: np.ndarray, part: str, point: np.ndarray) -> n
     k = kinematics(tree, q, np.zeros(tree.nv))
     on_link = frame.position + rotations.rotate(frame.orientation, point)
     lever = rotations.rotate(k.orientation[frame.link], on_link)
-    return k.linear_jacobian[frame.link] - rotations.skew(lever) @ k.angular_jacobian[frame.link]
+    linear, angular = k.linear_jacobian[frame.link], k.angular_jacobian[frame.link]
+    return np.asarray(linear - rotations.skew(lever) @ angular)
 
 
 def energy(tree: Tree, q: np.ndarray, v: np.ndarray, gravity: np.ndarray) -> tuple[float, float]:
@@ -148,14 +150,18 @@ def joint_wrenches(
     pairs: Sequence[PointPair] = (),
     forces: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Force (links, 3) N and torque (links, 3) N m ON each link by its joint, about the link's origin, world axes.
+    """Return force (links, 3) N and torque (links, 3) N m ON each link by its joint, world axes.
 
-    A joint passes on all that accelerates the links beyond it and that neither gravity nor the point pairs supply:
-    constraint reactions and the joint's own force tau together.
+    The torque is about the link's origin, where the force acts.
+
+    A joint passes on all that accelerates the links beyond it and that neither gravity nor the point pairs
+    supply: constraint reactions and the joint's own force tau together.
 
     Args:
         tree: the model.
-        q, v, vdot: configuration (nq,), velocity and acceleration (nv,).
+        q: (nq,) configuration.
+        v: (nv,) velocity.
+        vdot: (nv,) acceleration.
         gravity: (3,) m/s^2, world axes.
         pairs: constraints that act on the links as well.
         forces: (pairs, 3) N on b's parts at b, world axes, as in ``ConstrainedMotion``.
@@ -167,7 +173,7 @@ def joint_wrenches(
     f = bodies.gravity_and_gyroscopic(state[:, W], gravity)
     loads = (bodies.diagonal * (T @ vdot + Tdot @ v) - f).reshape(-1, 6)
     force = np.vstack([loads[:, :3], np.zeros(3)])
-    torque = np.vstack([rotations.rotate(state[:, 3:7], loads[:, 3:]), np.zeros(3)])
+    torque = np.vstack([rotations.rotate(state[:, Q], loads[:, 3:]), np.zeros(3)])
     torque[:-1] += np.cross(state[:, C] - k.position[:-1], force[:-1])
     for pair, push in zip(pairs, np.zeros((0, 3)) if forces is None else forces, strict=True):
         frame = tree.frame(pair.b.part)

@@ -1,4 +1,4 @@
-"""Where the links are and how they move: poses, velocities, Jacobians and their rates, from the root outwards."""
+"""Where the links are and how they move: poses, velocities, Jacobians and their rates."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from physics_prior.model import JointKind, Link, Tree
 
 @dataclass(frozen=True)
 class Kinematics:
-    """Motion of all link frames, world axes. Row n is the world at rest, so that the parent index -1 finds it.
+    """Motion of all link frames in world axes; the last row is the world, so that the index -1 finds it.
 
     Attributes:
         position: (n + 1, 3) m, origin of each link's frame (the joint that carries it).
@@ -18,7 +18,7 @@ class Kinematics:
         velocity: (n + 1, 3) m/s, of the origin.
         angular_velocity: (n + 1, 3) rad/s.
         linear_jacobian, angular_jacobian: (n + 1, 3, nv), from v to the two velocities.
-        linear_jacobian_rate, angular_jacobian_rate: (n + 1, 3, nv), their derivatives by time along the motion.
+        linear_jacobian_rate, angular_jacobian_rate: (n + 1, 3, nv), their time derivatives.
     """
 
     position: np.ndarray
@@ -32,7 +32,7 @@ class Kinematics:
 
 
 def kinematics(tree: Tree, q: np.ndarray, v: np.ndarray) -> Kinematics:
-    """Kinematics of all links at configuration q (nq,), unit quaternions, and velocity v (nv,)."""
+    """Walk from the roots outwards at q (nq,), its quaternions of unit length, and v (nv,)."""
     n = len(tree.links)
     position, orientation = np.zeros((n + 1, 3)), np.zeros((n + 1, 4))
     orientation[-1, 0] = 1.0
@@ -77,7 +77,7 @@ def kinematics(tree: Tree, q: np.ndarray, v: np.ndarray) -> Kinematics:
 
 
 def joint_pose(link: Link, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Position (3,) and quaternion (4,) of a link in its parent link's frame, at the joint's own coordinates q."""
+    """Place a link in its parent link's frame: position (3,) and quaternion (4,) at the joint's own q."""
     joint = link.joint
     if joint.kind is JointKind.FREE:
         return q[:3], q[3:]

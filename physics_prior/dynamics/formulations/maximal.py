@@ -1,8 +1,8 @@
 """Maximal coordinates: every link a free body, every joint an explicit constraint (equations 3 and 4).
 
-State of a body: y = (c, q, v, w'), centre of mass and quaternion, velocity in world axes, angular velocity in body
-axes, which are the principal axes of inertia. Joints are point pairs like loops and attachments, only more of them:
-what a joint forbids, a Lagrange multiplier holds.
+State of a body: y = (c, q, v, w'), centre of mass and quaternion, velocity in world axes, angular velocity in
+body axes, which are the principal axes of inertia. Joints are point pairs like loops and attachments, only
+more of them: what a joint forbids, a Lagrange multiplier holds.
 """
 
 from collections.abc import Sequence
@@ -36,11 +36,11 @@ class MaximalCoordinates:
         self.pairs = point_pairs.body_pairs(self.bodies, pairs)
 
     def state(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """(n, 13) state (c, q, v, w') of each body at configuration q (nq,) and velocity v (nv,) of the tree."""
+        """(n, 13) states (c, q, v, w') of the bodies at q (nq,) and v (nv,) of the tree."""
         return self.bodies.state(q, v)
 
     def generalized(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Configuration (nq,) and velocity (nv,) of the tree, read off the bodies' states (n, 13).
+        """Read configuration (nq,) and velocity (nv,) of the tree off the bodies' states (n, 13).
 
         Angles come out in (-pi, pi]; what the joints forbid but drift has brought in is left out.
         """
@@ -73,18 +73,19 @@ class MaximalCoordinates:
         return q, v
 
     def generalized_acceleration(self, q: np.ndarray, v: np.ndarray, xddot: np.ndarray) -> np.ndarray:
-        """Return vdot (nv,) of the tree at q, v from accelerations (n, 6) of the bodies: xddot = T vdot + dT/dt v."""
+        """Read vdot (nv,) off accelerations (n, 6) of the bodies at q, v: xddot = T vdot + dT/dt v."""
         T, Tdot = self.bodies.velocity_map(kinematics(self.tree, q, v))
-        return np.linalg.lstsq(T, xddot.ravel() - Tdot @ v, rcond=None)[0]
+        return np.asarray(np.linalg.lstsq(T, xddot.ravel() - Tdot @ v, rcond=None)[0])
 
     def solve(self, state: np.ndarray, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
         """Equation 4: accelerations (n, 6) of the bodies (vdot world, w'dot), forces (pairs, 3) and rank.
 
-        f is gravity, the gyroscopic torque -w' x I'w' of equation 3 and the joints' own forces tau (nv,); forces and rank
-        are those of ``ConstrainedMotion``.
+        f is gravity, the gyroscopic torque -w' x I'w' of equation 3 and the joints' own forces tau (nv,);
+        forces and rank are those of ``ConstrainedMotion``.
 
         Raises:
-            SimulationError: the state is not finite, or a part without inertia is not held by its constraints.
+            SimulationError: the state is not finite, or a part without inertia is not held by its
+                constraints.
         """
         f = self.bodies.gravity_and_gyroscopic(state[:, W], self.gravity)
         f = f + self.bodies.joint_loads(state, tau).ravel()
@@ -101,7 +102,7 @@ class MaximalCoordinates:
         return np.hstack([state[:, V], rotations.derivative(state[:, Q], state[:, W]), acceleration])
 
     def residual(self, state: np.ndarray) -> np.ndarray:
-        """(rows,) m, by how much the joints' and the pairs' rows are violated at the states (n, 13): the drift."""
+        """(rows,) m, by how much states (n, 13) violate the rows of joints and pairs: the drift."""
         return point_pairs.residual([*self.joints, *self.pairs], state)
 
 
@@ -123,7 +124,7 @@ def accelerations(
 
 
 def joint_pairs(tree: Tree) -> list[PointPair]:
-    """The joints of a tree as point pairs: three rows for a spherical joint, five for a revolute or prismatic one."""
+    """State the joints as point pairs: three rows for a spherical, five for a revolute or prismatic one."""
     return [pair for link in tree.links for pair in _joint_pairs(tree, link)]
 
 
@@ -153,7 +154,7 @@ def _joint_pairs(tree: Tree, link: Link) -> list[PointPair]:
 
 
 def _radius_of_gyration(link: Link) -> float:
-    """A length typical of the link, m, so that turning and shifting weigh alike in its rows."""
+    """Give a length typical of the link, m, so that turning and shifting weigh alike in its rows."""
     body = link.mass_properties
     radius = np.sqrt(np.trace(body.inertia) / body.mass) if body.mass > 0.0 else 0.0
     return float(radius) or 1.0

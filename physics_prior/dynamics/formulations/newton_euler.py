@@ -9,7 +9,7 @@ from physics_prior.dynamics.formulations.kinematics import Kinematics, kinematic
 from physics_prior.model import JointKind, Tree
 
 C, Q, V, W = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13)
-"""Columns of a state of bodies (n, 13): centre of mass, quaternion, velocity (world), angular velocity (body)."""
+"""Columns of states (n, 13): centre of mass, quaternion, velocity (world), angular velocity (body)."""
 
 WORLD = np.eye(1, 13, 3)
 """(1, 13) the world as a body at rest: appended to a state, so that the index -1 finds it."""
@@ -35,7 +35,7 @@ class Bodies:
 
     @classmethod
     def of(cls, tree: Tree) -> "Bodies":
-        """The bodies of a tree."""
+        """Take a tree apart into its bodies."""
         properties = [link.mass_properties for link in tree.links]
         principal = [body.principal_axes() for body in properties]
         return cls(
@@ -53,7 +53,7 @@ class Bodies:
 
     @property
     def typical_inertia(self) -> np.ndarray:
-        """(n, 2) what moves about as hard as each body: its mass and its largest moment, one where it has none."""
+        """(n, 2) kg and kg m^2, mass and largest moment of each body, one where it has none."""
         typical = np.stack([self.mass, self.moments.max(axis=1)], axis=1)
         return np.where(typical > 0.0, typical, 1.0)
 
@@ -69,7 +69,7 @@ class Bodies:
         return state
 
     def velocity_map(self, k: Kinematics) -> tuple[np.ndarray, np.ndarray]:
-        """T and dT/dt, (6 n, nv): from v to the velocities (v, w') of all bodies, and its rate along the motion."""
+        """T and dT/dt, (6 n, nv): from v to the velocities (v, w') of all bodies, and its rate."""
         T, Tdot = np.zeros((2, len(self.mass), 6, self.tree.nv))
         for i in range(len(self.mass)):
             offset = rotations.rotate(k.orientation[i], self.center[i])
@@ -89,14 +89,14 @@ class Bodies:
         return -np.cross(angular_velocity, self.moments * angular_velocity)
 
     def gravity_and_gyroscopic(self, angular_velocity: np.ndarray, gravity: np.ndarray) -> np.ndarray:
-        """(6 n,) force on each body (world) and torque (body axes): gravity (3,) m/s^2 and the gyroscopic term."""
+        """(6 n,) forces (world) and torques (body axes) of gravity (3,) m/s^2 and the gyroscopic term."""
         return np.hstack([self.mass[:, None] * gravity, self.gyroscopic(angular_velocity)]).ravel()
 
     def joint_loads(self, state: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """(n, 6) force (world, at the centre of mass) and torque (body axes) on each body by joint forces tau (nv,).
+        """(n, 6) forces (world, at the centre of mass) and torques (body axes) by joint forces tau (nv,).
 
-        A joint pushes the child with a force and a torque at the child's origin, and the parent with the opposite,
-        so that the loads f have T^T f = tau (virtual work, equation 6).
+        A joint pushes the child with a force and a torque at the child's origin, and the parent with the
+        opposite, so that the loads f have T^T f = tau (virtual work, equation 6).
         """
         loads = np.zeros((len(self.mass) + 1, 6))
         states = np.vstack([state, WORLD])

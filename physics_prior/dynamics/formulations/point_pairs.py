@@ -1,4 +1,4 @@
-"""Point pairs as constraint rows e(x) = 0 on free bodies: residual, A = de/dx and the rate of A (equation 4)."""
+"""Point pairs as rows e(x) = 0 on free bodies: residual, A = de/dx and the rate of A (equation 4)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -50,8 +50,9 @@ def residual(pairs: Sequence[BodyPair], state: np.ndarray) -> np.ndarray:
 def rows(pairs: Sequence[BodyPair], state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return A (rows, 6 n), with edot = A xdot, and gamma = -(dA/dt) xdot (rows,), so that A xddot = gamma.
 
-    xdot is (v, w') of all bodies. Directions turn with a's part, so a row's rate is that of b as seen from a: b's
-    velocity less the velocity of the point of a's part that is at b just now, which then has a Coriolis term.
+    xdot is (v, w') of all bodies. Directions turn with a's part, so a row's rate is that of b as seen from a:
+    b's velocity less the velocity of the point of a's part that is at b just now, which then has a Coriolis
+    term.
 
     Raises:
         SimulationError: the two points of a rod coincide, so it has no direction.
@@ -90,7 +91,7 @@ def forces(pairs: Sequence[BodyPair], state: np.ndarray, multipliers: np.ndarray
 
 
 def _on_body(bodies: Bodies, anchor: Anchor) -> tuple[int, np.ndarray, np.ndarray]:
-    """Index of the anchor's body, its point in that body's frame, and the quaternion from part to body axes."""
+    """Index of an anchor's body, its point in that body's frame, and the turn from part to body axes."""
     frame = bodies.tree.frame(anchor.part)
     point = frame.position + rotations.rotate(frame.orientation, anchor.point)
     if frame.link < 0:
@@ -103,7 +104,7 @@ def _on_body(bodies: Bodies, anchor: Anchor) -> tuple[int, np.ndarray, np.ndarra
 def _directions(pair: BodyPair, a: "_Point", b: "_Point") -> np.ndarray:
     """(rows, 3) unit directions of a pair in world axes."""
     if pair.length is None:
-        return pair.directions @ a.R.T
+        return np.asarray(pair.directions @ a.R.T)
     gap = b.position - a.position
     distance = np.linalg.norm(gap)
     if distance < 1e-12 * pair.length:
@@ -125,5 +126,5 @@ class _Point:
         self.centripetal = np.cross(self.angular_velocity, np.cross(self.angular_velocity, self.reach))
 
     def row(self, d: np.ndarray) -> np.ndarray:
-        """(rows, 6) what maps (vdot, w'dot) of the body to the point's acceleration along directions d (rows, 3)."""
+        """(rows, 6) from (vdot, w'dot) of the body to the point's acceleration along d (rows, 3)."""
         return np.hstack([d, -d @ rotations.skew(self.reach) @ self.R])

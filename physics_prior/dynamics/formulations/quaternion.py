@@ -1,8 +1,9 @@
-"""Quaternions as coordinates: four accelerations a body, held on the unit sphere by one constraint (equation 5).
+"""Quaternions as coordinates, held on the unit sphere by one constraint a body (equation 5).
 
-Coordinates of a body: (c, q), rates (cdot, qdot), accelerations (cddot, qddot). The mass matrix of the rotation,
-4 Q J Q^T with J = diag(0, I'), has rank 3: only together with the norm constraint 2 q . qddot = -2 |qdot|^2 is qddot
-determined. The multiplier of that constraint is w'^T I' w', a free body's too: bookkeeping, not a force.
+Coordinates of a body: (c, q), rates (cdot, qdot), accelerations (cddot, qddot). The mass matrix of the
+rotation, 4 Q J Q^T with J = diag(0, I'), has rank 3: only together with the norm constraint 2 q . qddot = -2
+|qdot|^2 is qddot determined. The multiplier of that constraint is w'^T I' w', a free body's too: bookkeeping,
+not a force.
 """
 
 from collections.abc import Sequence
@@ -35,7 +36,7 @@ def rotational_force(q: np.ndarray, qdot: np.ndarray, moments: np.ndarray, torqu
     """
     left_rate = rotations.left_matrix(qdot)
     gyroscopic = 8.0 * left_rate @ np.diag([0.0, *moments]) @ left_rate.T @ q
-    return 2.0 * rotations.left_matrix(q) @ np.array([0.0, *torque]) + gyroscopic
+    return np.asarray(2.0 * rotations.left_matrix(q) @ np.array([0.0, *torque]) + gyroscopic)
 
 
 def rotational_motion(
@@ -70,12 +71,12 @@ class QuaternionCoordinates:
         self.maximal = MaximalCoordinates(tree, gravity, pairs)
 
     def state(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """(n, 14) state (c, q, cdot, qdot) of each body at configuration q (nq,) and velocity v (nv,) of the tree."""
+        """(n, 14) states (c, q, cdot, qdot) of the bodies at q (nq,) and v (nv,) of the tree."""
         y = self.maximal.state(q, v)
         return np.hstack([y[:, : W.start], rotations.derivative(y[:, Q], y[:, W])])
 
     def generalized(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Configuration (nq,) and velocity (nv,) of the tree, read off the bodies' states (n, 14)."""
+        """Read configuration (nq,) and velocity (nv,) of the tree off the bodies' states (n, 14)."""
         return self.maximal.generalized(_with_angular_velocity(state))
 
     def solve(self, state: np.ndarray, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
@@ -84,7 +85,8 @@ class QuaternionCoordinates:
         The multipliers of the norm constraints are no forces and stay inside. tau: (nv,) joint forces.
 
         Raises:
-            SimulationError: the state is not finite, or a part without inertia is not held by its constraints.
+            SimulationError: the state is not finite, or a part without inertia is not held by its
+                constraints.
         """
         bodies, n = self.maximal.bodies, len(state)
         y = _with_angular_velocity(state)
@@ -137,5 +139,5 @@ def accelerations(
 
 
 def _with_angular_velocity(state: np.ndarray) -> np.ndarray:
-    """(n, 13) states (c, q, v, w') of states (n, 14) with quaternion rates: (0; w') = 2 Q^T qdot (equation 2)."""
+    """States (c, q, v, w') of states with quaternion rates: (0; w') = 2 Q^T qdot (equation 2)."""
     return np.hstack([state[:, : RATE.start], rotations.angular_velocity_body(state[:, Q], state[:, RATE])])

@@ -1,0 +1,45 @@
+"""Model, effects, measurements, noise and readouts of one scene, read from one file."""
+
+from physics_prior.scene.loader import load_scene
+from physics_prior.scene.measurements import (
+    JointSource,
+    Marker,
+    MeasurementSource,
+    OrientationSource,
+    PointsSource,
+    PoseSource,
+)
+from physics_prior.scene.readouts import (
+    AngleReadout,
+    EnergyReadout,
+    ForceReadout,
+    JointReadout,
+    PointReadout,
+    Readout,
+)
+from physics_prior.scene.scene import Initial, Noise, Scene
+from physics_prior.scene.schema import Gate, Health, Pose, Simulation, Step
+
+__all__ = [
+    "AngleReadout",
+    "EnergyReadout",
+    "ForceReadout",
+    "Gate",
+    "Health",
+    "Initial",
+    "JointReadout",
+    "JointSource",
+    "Marker",
+    "MeasurementSource",
+    "Noise",
+    "OrientationSource",
+    "PointReadout",
+    "PointsSource",
+    "Pose",
+    "PoseSource",
+    "Readout",
+    "Scene",
+    "Simulation",
+    "Step",
+    "load_scene",
+]

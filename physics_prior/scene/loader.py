@@ -1,0 +1,138 @@
+"""Scene files read: from YAML to a checked Scene, every error naming file, line and field."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from physics_prior.effects import REGISTRY, Effect
+from physics_prior.errors import PhysicsPriorError, SceneError
+from physics_prior.model import Tree
+from physics_prior.resources import scene_path
+from physics_prior.scene.freedoms import read_initial, read_noise
+from physics_prior.scene.measurements import SOURCES, MeasurementSource
+from physics_prior.scene.parts import build_tree
+from physics_prior.scene.quantity import parse_quantity, stated_units
+from physics_prior.scene.readouts import READOUTS, Readout, Subject
+from physics_prior.scene.scene import Scene
+from physics_prior.scene.schema import SceneFile, check_name
+from physics_prior.scene.section import choose, relocate, validate
+from physics_prior.scene.yaml_file import Place, read_yaml
+
+
+def load_scene(name_or_path: str | Path) -> Scene:
+    """Load a shipped scene by its name, or any scene file by its path.
+
+    Raises:
+        SceneError: no such scene, or one sentence `FILE:LINE: FIELD: what is wrong and what would be valid`.
+    """
+    path = scene_path(name_or_path)
+    top = read_yaml(path)
+    file = validate(SceneFile, top)
+    tree = build_tree(top["model"])
+    effects = _read_effects(top.get("effects"), tree)
+    measurements = _read_measurements(top.get("measurements"), tree)
+    if measurements and file.noise is None:
+        raise top.error(
+            "'noise' is missing: say how far to trust the model, for example 'noise: {force: 1e-3}'"
+        )
+    return Scene(
+        name=path.stem,
+        path=path,
+        description=file.description.strip(),
+        frame_id=file.frame_id,
+        tree=tree,
+        effects=effects,
+        measurements=measurements,
+        noise=read_noise(top.get("noise"), tree),
+        readouts=_read_readouts(top.get("readouts"), Subject(tree, effects)),
+        gate=file.gate,
+        health=file.health,
+        step=file.step,
+        initial=read_initial(top.get("initial"), tree),
+        simulation=file.simulation,
+    )
+
+
+def _read_effects(place: Place, tree: Tree) -> tuple[Effect, ...]:
+    effects: list[Effect] = []
+    joints = [joint.name for joint in tree.joints]
+    known = list(tree.frames) + joints
+    for entry in place.entries():
+        _, effect_type, inner = choose(entry, REGISTRY, "an effect")
+        effect = validate(effect_type, inner, _in_si_units(effect_type, inner))
+        try:
+            check_name(effect.label)
+            effect.check(tree)
+            held = _check_finite(effect, tree)
+        except PhysicsPriorError as error:
+            raise relocate(inner, error, known) from None
+        except ValueError as error:
+            raise inner.error(str(error), "name") from None
+        if effect.label in [other.label for other in effects]:
+            raise inner.error(
+                f"name '{effect.label}' is another effect's: give this one its own 'name'", "name"
+            )
+        if held and effect.label in joints:
+            raise inner.error(f"name '{effect.label}' is a joint's: give this effect its own 'name'", "name")
+        effects.append(effect)
+    return tuple(effects)
+
+
+def _in_si_units(effect_type: type[Effect], place: Place) -> dict[str, Any]:
+    """Fields of an effect as plain values, quantities in SI units, which its own descriptions state."""
+    values = {}
+    for key, entry in place.items():
+        field = effect_type.model_fields.get(key)
+        units = stated_units(field.description) if field is not None else ()
+        values[key] = _converted(entry, units) if units else entry.value
+    return values
+
+
+def _converted(place: Place, units: tuple[str, ...]) -> Any:
+    if place.is_mapping:
+        return {key: _converted(entry, units) for key, entry in place.items()}
+    if place.is_list:
+        return [_converted(entry, units) for entry in place.entries()]
+    try:
+        return parse_quantity(place.value, *units) if isinstance(place.value, str) else place.value
+    except ValueError as error:
+        raise place.error(str(error)) from None
+
+
+def _check_finite(effect: Effect, tree: Tree) -> bool:
+    """Refuse an effect that makes numbers that are not finite; return whether it holds something.
+
+    A zero axis, say, passes an effect's own check of types and gives directions of NaN.
+    """
+    with np.errstate(all="ignore"):
+        pairs = effect.point_pairs(tree)
+        arrays = [effect.field(), effect.parameters(tree)]
+        arrays += [array for pair in pairs for array in (pair.a.point, pair.b.point, pair.directions)]
+    if not all(np.all(np.isfinite(array)) for array in arrays):
+        raise SceneError("makes numbers that are not finite: an axis must not be zero")
+    return len(pairs) > 0
+
+
+def _read_measurements(place: Place, tree: Tree) -> tuple[MeasurementSource, ...]:
+    sources: list[MeasurementSource] = []
+    for entry in place.entries():
+        _, source_type, inner = choose(entry, SOURCES, "a measurement")
+        source = validate(source_type, inner)
+        source.check(tree, inner)
+        if source.topic in [other.topic for other in sources]:
+            raise inner.error(f"topic '{source.topic}' is read twice: give each measurement its own", "topic")
+        sources.append(source)
+    return tuple(sources)
+
+
+def _read_readouts(place: Place, subject: Subject) -> tuple[Readout, ...]:
+    readouts: list[Readout] = []
+    for entry in place.entries():
+        _, readout_type, inner = choose(entry, READOUTS, "a readout")
+        readout = validate(readout_type, inner)
+        readout.check(subject, inner)
+        if readout.name in [other.name for other in readouts]:
+            raise inner.error(f"name '{readout.name}' is used by another readout: give each its own", "name")
+        readouts.append(readout)
+    return tuple(readouts)

@@ -1,0 +1,122 @@
+"""What a scene measures: which topic tells what about which part, and how noisily."""
+
+from typing import Annotated, ClassVar
+
+from pydantic import Field
+
+from physics_prior.model import JointKind, Tree
+from physics_prior.scene.quantity import quantity
+from physics_prior.scene.schema import Name, Number, Pose, Position, PositiveAngle, PositiveLength, Topic
+from physics_prior.scene.section import Section, require_known
+from physics_prior.scene.yaml_file import Place
+
+
+class MeasurementSource(Section):
+    """Base of all sources. Noise is a standard deviation per axis, white, of the measured quantity.
+
+    Where a message carries a covariance that is not zero, that one holds instead of the scene's noise.
+    """
+
+    message_types: ClassVar[tuple[str, ...]]
+
+    topic: Topic
+
+    def check(self, tree: Tree, place: Place) -> None:
+        """Raise SceneError at its place in the file if the source does not fit the model."""
+        raise NotImplementedError
+
+
+class _PartSource(MeasurementSource):
+    message_types = ("geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped")
+
+    part: str
+    frame: Pose = Pose()
+    orientation_noise: PositiveAngle
+
+    def check(self, tree: Tree, place: Place) -> None:
+        """Check part, joint and marker names."""
+        require_known(place, self.part, part_names(tree), "part", "part")
+
+
+class PoseSource(_PartSource):
+    """The pose of a frame of a part in the world.
+
+    Attributes:
+        part, frame: the measured frame, given in the part's.
+        position_noise: m.
+        orientation_noise: rad, of the rotation vector in the measured frame.
+        scale: measured positions are multiplied by it, where a tracker's length scale is known to be off.
+    """
+
+    position_noise: PositiveLength
+    scale: Annotated[Number, Field(gt=0.0)] = 1.0
+
+
+class OrientationSource(_PartSource):
+    """The orientation of a frame of a part in the world; the position of the message is not read."""
+
+
+class Marker(Section):
+    """A named point, m, of a part."""
+
+    name: Name
+    part: str
+    point: Position = (0.0, 0.0, 0.0)
+
+
+class PointsSource(MeasurementSource):
+    """Positions of markers in the world, in the order of the PoseArray; a marker of NaN is not seen."""
+
+    message_types = ("geometry_msgs/msg/PoseArray",)
+
+    markers: Annotated[tuple[Marker, ...], Field(min_length=1)]
+    noise: PositiveLength
+
+    def check(self, tree: Tree, place: Place) -> None:
+        """Check part, joint and marker names."""
+        seen: set[str] = set()
+        for index, marker in enumerate(self.markers):
+            here = place["markers"][index]
+            require_known(here, marker.part, part_names(tree), "part", "part")
+            if marker.name in seen:
+                raise here.error(f"name '{marker.name}' is another marker's: give each its own", "name")
+            seen.add(marker.name)
+
+
+class JointSource(MeasurementSource):
+    """Coordinates of revolute and prismatic joints.
+
+    Attributes:
+        joints: name in the message -> joint; other names in the message are ignored.
+        noise: rad or m.
+    """
+
+    message_types = ("sensor_msgs/msg/JointState",)
+
+    joints: Annotated[dict[str, str], Field(min_length=1)]
+    noise: Annotated[float, quantity("rad", "m"), Field(gt=0.0)]
+
+    def check(self, tree: Tree, place: Place) -> None:
+        """Check part, joint and marker names."""
+        known = scalar_joint_names(tree)
+        for name, joint in self.joints.items():
+            require_known(place["joints"], joint, known, "revolute or prismatic joint", name)
+
+
+SOURCES: dict[str, type[MeasurementSource]] = {
+    "pose": PoseSource,
+    "orientation": OrientationSource,
+    "points": PointsSource,
+    "joints": JointSource,
+}
+"""Every kind of measurement, by its key in the scene file."""
+
+
+def part_names(tree: Tree) -> list[str]:
+    """Names of the parts, the world left out."""
+    return [part.name for part in tree.parts]
+
+
+def scalar_joint_names(tree: Tree) -> list[str]:
+    """Names of the joints that have one coordinate."""
+    return [joint.name for joint in tree.joints if joint.kind in (JointKind.REVOLUTE, JointKind.PRISMATIC)]

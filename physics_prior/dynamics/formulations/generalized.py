@@ -74,8 +74,9 @@ def mixed_accelerations(
         SimulationError: as ``constrained_motion.solve``, and a rod without direction.
     """
     bodies = Bodies.of(tree)
-    T, Tdot = bodies.velocity_map(kinematics(tree, q, v))
-    state = bodies.state(q, v)
+    k = kinematics(tree, q, v)
+    T, Tdot = bodies.velocity_map(k)
+    state = bodies.state(k)
     f = bodies.gravity_and_gyroscopic(state[:, W], gravity)
     mass = bodies.diagonal[:, None] * T
     closed = point_pairs.body_pairs(bodies, pairs)
@@ -97,8 +98,9 @@ def attach(
     axes, and the rank.
     """
     bodies = Bodies.of(tree)
-    T, _ = bodies.velocity_map(kinematics(tree, q, v))
-    state = bodies.state(q, v)
+    k = kinematics(tree, q, v)
+    T, _ = bodies.velocity_map(k)
+    state = bodies.state(k)
     closed = point_pairs.body_pairs(bodies, pairs)
     A, _ = point_pairs.rows(closed, state)
     M = T.T @ (bodies.diagonal[:, None] * T)
@@ -111,10 +113,10 @@ def constraint_jacobian(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the residual e(q), (rows,) m, of point pairs and its Jacobian A T, (rows, nv): edot = A T v."""
     bodies = Bodies.of(tree)
-    rest = np.zeros(tree.nv)
-    state = bodies.state(q, rest)
+    k = kinematics(tree, q, np.zeros(tree.nv))
+    state = bodies.state(k)
     closed = point_pairs.body_pairs(bodies, pairs)
-    T, _ = bodies.velocity_map(kinematics(tree, q, rest))
+    T, _ = bodies.velocity_map(k)
     return point_pairs.residual(closed, state), point_pairs.rows(closed, state)[0] @ T
 
 
@@ -135,8 +137,9 @@ def point_jacobian(tree: Tree, q: np.ndarray, part: str, point: np.ndarray) -> n
 def energy(tree: Tree, q: np.ndarray, v: np.ndarray, gravity: np.ndarray) -> tuple[float, float]:
     """Kinetic and potential energy, J; the potential is zero with all mass in the world's origin."""
     bodies = Bodies.of(tree)
-    T, _ = bodies.velocity_map(kinematics(tree, q, v))
-    center = bodies.state(q, v)[:, C]
+    k = kinematics(tree, q, v)
+    T, _ = bodies.velocity_map(k)
+    center = bodies.state(k)[:, C]
     kinetic = 0.5 * bodies.diagonal @ (T @ v) ** 2
     return float(kinetic), float(-bodies.mass @ center @ gravity)
 
@@ -169,7 +172,7 @@ def joint_wrenches(
     bodies = Bodies.of(tree)
     k = kinematics(tree, q, v)
     T, Tdot = bodies.velocity_map(k)
-    state = bodies.state(q, v)
+    state = bodies.state(k)
     f = bodies.gravity_and_gyroscopic(state[:, W], gravity)
     loads = (bodies.diagonal * (T @ vdot + Tdot @ v) - f).reshape(-1, 6)
     force = np.vstack([loads[:, :3], np.zeros(3)])

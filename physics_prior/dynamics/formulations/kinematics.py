@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from physics_prior import rotations
+from physics_prior.errors import SimulationError
 from physics_prior.model import JointKind, Link, Tree
 
 
@@ -32,7 +33,13 @@ class Kinematics:
 
 
 def kinematics(tree: Tree, q: np.ndarray, v: np.ndarray) -> Kinematics:
-    """Walk from the roots outwards at q (nq,), its quaternions of unit length, and v (nv,)."""
+    """Walk from the roots outwards at q (nq,), its quaternions of unit length, and v (nv,).
+
+    Raises:
+        SimulationError: q or v is not finite.
+    """
+    if not (np.all(np.isfinite(q)) and np.all(np.isfinite(v))):
+        raise SimulationError(f"the state q {q.tolist()}, v {v.tolist()} is not finite: it has no motion")
     n = len(tree.links)
     position, orientation = np.zeros((n + 1, 3)), np.zeros((n + 1, 4))
     orientation[-1, 0] = 1.0

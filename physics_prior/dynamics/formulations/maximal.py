@@ -37,7 +37,7 @@ class MaximalCoordinates:
 
     def state(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """(n, 13) states (c, q, v, w') of the bodies at q (nq,) and v (nv,) of the tree."""
-        return self.bodies.state(q, v)
+        return self.bodies.state(kinematics(self.tree, q, v))
 
     def generalized(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Read configuration (nq,) and velocity (nv,) of the tree off the bodies' states (n, 13).

@@ -1,11 +1,12 @@
 """The links of a tree as free rigid bodies: Newton-Euler equations in principal axes (equation 3)."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from physics_prior import rotations
-from physics_prior.dynamics.formulations.kinematics import Kinematics, kinematics
+from physics_prior.dynamics.formulations.kinematics import Kinematics
 from physics_prior.model import JointKind, Tree
 
 C, Q, V, W = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13)
@@ -15,7 +16,7 @@ WORLD = np.eye(1, 13, 3)
 """(1, 13) the world as a body at rest: appended to a state, so that the index -1 finds it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bodies:
     """The links as free bodies, body frame = principal axes about the centre of mass.
 
@@ -34,6 +35,7 @@ class Bodies:
     axes: np.ndarray
 
     @classmethod
+    @lru_cache(maxsize=16)  # principal axes take longer than the motion, and a tree does not change
     def of(cls, tree: Tree) -> "Bodies":
         """Take a tree apart into its bodies."""
         properties = [link.mass_properties for link in tree.links]
@@ -57,9 +59,8 @@ class Bodies:
         typical = np.stack([self.mass, self.moments.max(axis=1)], axis=1)
         return np.where(typical > 0.0, typical, 1.0)
 
-    def state(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """(n, 13) states of the bodies at q (nq,), v (nv,) of the tree."""
-        k = kinematics(self.tree, q, v)
+    def state(self, k: Kinematics) -> np.ndarray:
+        """(n, 13) states of the bodies as the links move."""
         state = np.empty((len(self.tree.links), 13))
         offset = rotations.rotate(k.orientation[:-1], self.center)
         state[:, C] = k.position[:-1] + offset

@@ -40,9 +40,10 @@ def body_pairs(bodies: Bodies, pairs: Sequence[PointPair]) -> list[BodyPair]:
 
 def residual(pairs: Sequence[BodyPair], state: np.ndarray) -> np.ndarray:
     """e(x), (rows,) m, at the states (n, 13) of the bodies: d . (b - a), of a rod |b - a| - length."""
+    states = np.vstack([state, WORLD])
     out = [np.zeros(0)]
     for pair in pairs:
-        a, b = _Point(state, pair.a, pair.point_a), _Point(state, pair.b, pair.point_b)
+        a, b = _Point(states, pair.a, pair.point_a), _Point(states, pair.b, pair.point_b)
         out.append(_directions(pair, a, b) @ (b.position - a.position) - (pair.length or 0.0))
     return np.concatenate(out)
 
@@ -59,11 +60,12 @@ def rows(pairs: Sequence[BodyPair], state: np.ndarray) -> tuple[np.ndarray, np.n
     """
     n, m = len(state), sum(pair.rows for pair in pairs)
     A, gamma = np.zeros((m, n + 1, 6)), np.zeros(m)  # the world's columns, last, are dropped at the end
+    states = np.vstack([state, WORLD])
     start = 0
     for pair in pairs:
-        a, b = _Point(state, pair.a, pair.point_a), _Point(state, pair.b, pair.point_b)
+        a, b = _Point(states, pair.a, pair.point_a), _Point(states, pair.b, pair.point_b)
         if pair.length is None:
-            a = _Point(state, pair.a, a.R.T @ (b.position - a.center))
+            a = _Point(states, pair.a, a.R.T @ (b.position - a.center))
         d = _directions(pair, a, b)
         approach = b.velocity - a.velocity
         if pair.length is None:
@@ -82,9 +84,10 @@ def rows(pairs: Sequence[BodyPair], state: np.ndarray) -> tuple[np.ndarray, np.n
 def forces(pairs: Sequence[BodyPair], state: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
     """f_c = -A^T lambda as forces, (pairs, 3) N, on b's part at b, world axes; multipliers (rows,)."""
     out = np.zeros((len(pairs), 3))
+    states = np.vstack([state, WORLD])
     start = 0
     for i, pair in enumerate(pairs):
-        a, b = _Point(state, pair.a, pair.point_a), _Point(state, pair.b, pair.point_b)
+        a, b = _Point(states, pair.a, pair.point_a), _Point(states, pair.b, pair.point_b)
         out[i] = -multipliers[start : start + pair.rows] @ _directions(pair, a, b)
         start += pair.rows
     return out
@@ -109,14 +112,14 @@ def _directions(pair: BodyPair, a: "_Point", b: "_Point") -> np.ndarray:
     distance = np.linalg.norm(gap)
     if distance < 1e-12 * pair.length:
         raise SimulationError(f"a rod of {pair.length:g} m has both ends in one point: it has no direction")
-    return (gap / distance)[None]
+    return np.asarray((gap / distance)[None])
 
 
 class _Point:
     """A point fixed on a body, given in the body's axes about its centre of mass; all else in world axes."""
 
-    def __init__(self, state: np.ndarray, body: int, point: np.ndarray) -> None:
-        own = np.vstack([state, WORLD])[body]
+    def __init__(self, states: np.ndarray, body: int, point: np.ndarray) -> None:
+        own = states[body]
         self.R = rotations.matrix_from_quaternion(own[Q])
         self.center = own[C]
         self.reach = self.R @ point

@@ -1,0 +1,82 @@
+"""Compose the step of a scene: the template step.py with just the effects that the scene names.
+
+The composed module is a small readable file in the kernel cache (``physics-prior check --show-step`` prints it). One
+line an effect; the effects inline into it, the disk cache hits on the next start, and an edit of an effect misses it as
+it must, because the module's name is a digest of its text in a folder keyed by all kernel sources.
+"""
+
+import hashlib
+import importlib.util
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import ModuleType
+
+from physics_prior.dynamics.kernel import cache_directory
+from physics_prior.effects.effect import Effect
+from physics_prior.model import Tree
+
+RUNGE_KUTTA, SEMI_IMPLICIT_EULER = "rk4", "semi_implicit_euler"
+INTEGRATORS = (RUNGE_KUTTA, SEMI_IMPLICIT_EULER)
+GRAVITY = 3  # numbers at the head of the parameters
+
+
+def step_source(tree: Tree, effects: Sequence[Effect], constrained: bool, integrator: str) -> str:
+    """The text of a scene's step module."""
+    source = Path(__file__).with_name("step.py").read_text()
+    calls, slopes, imports = [], [], []
+    first = GRAVITY
+    for effect in effects:
+        if effect.compiled is None:
+            continue
+        last = first + len(effect.parameters(tree))
+        for function, arguments, lines in (
+            (effect.compiled.apply, "links, work, q, v, tau", calls),
+            (effect.compiled.differentiate, "links, work, q, v, tau_q, tau_v", slopes),
+        ):
+            name = function.py_func.__name__
+            lines.append(f"    {name}(parameters[{first}:{last}], {arguments})  # {effect.label}")
+            line = f"from {function.py_func.__module__} import {name}"
+            if line not in imports:
+                imports.append(line)
+        first = last
+    composed = "\n".join(imports)
+    if calls:
+        composed += (
+            "\n\n\n@kernel\ndef forces(parameters, links, work, q, v, tau):\n" + "\n".join(calls)
+            + "\n\n\n@kernel\ndef differentiate_forces(parameters, links, work, q, v, tau_q, tau_v):\n"
+            + "\n".join(slopes) + "\n"
+        )
+        source = _replace(source, "effects", composed)
+    source = _replace(source, "constraints", f"CONSTRAINED = {constrained}")
+    return _replace(source, "integrator", f"RUNGE_KUTTA = {integrator == RUNGE_KUTTA}")
+
+
+def step_module(tree: Tree, effects: Sequence[Effect], constrained: bool, integrator: str) -> ModuleType:
+    """The step module of a scene, written to the kernel cache where it is not there yet, and imported."""
+    text = step_source(tree, effects, constrained, integrator)
+    name = "step_" + hashlib.sha256(text.encode()).hexdigest()[:16]
+    if name in sys.modules:
+        return sys.modules[name]
+    path = cache_directory() / f"{name}.py"
+    if not path.exists():
+        # written aside and moved in place, so that another process never reads half a file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        aside = path.with_suffix(f".{os.getpid()}")
+        aside.write_text(text)
+        aside.replace(path)
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def _replace(source: str, mark: str, by: str) -> str:
+    """Replace the one line that ends in ``# scene: mark``."""
+    lines = source.splitlines()
+    (index,) = [i for i, line in enumerate(lines) if line.endswith(f"# scene: {mark}")]
+    lines[index] = by
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,256 @@
+"""A model and its effects, compiled: the one object that moves a body, differentiates its motion and tells its forces."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from physics_prior.dynamics import articulated_body, constraint, kinematics, newton_euler
+from physics_prior.dynamics.compose import GRAVITY, INTEGRATORS, RUNGE_KUTTA, step_module
+from physics_prior.dynamics.constraint_derivatives import GAP
+from physics_prior.dynamics.derivatives import COMPOSITE, FREEDOM
+from physics_prior.dynamics.records import WORK, link_records, pair_records
+from physics_prior.effects.effect import Effect, PointPair
+from physics_prior.errors import ModelError, SimulationError
+from physics_prior.model import Tree
+
+SINGULAR = 1e-13  # least eigenvalue of the scaled mass matrix: below, a joint moves nothing
+
+
+@dataclass(frozen=True)
+class Wrench:
+    """A force and a moment, (3,) N and (3,) N m, ON a part BY a constraint, at a point (3,) m; all in world axes."""
+
+    force: np.ndarray
+    moment: np.ndarray
+    point: np.ndarray
+
+
+class Simulator:
+    """The compiled step of a model with just the effects it is given.
+
+    State: q (nq,), v (nv,) as Tree says. Methods that move a state do it in place and without allocating.
+
+    Attributes:
+        tree, effects, integrator: what it was built from.
+        nq, nv, rows: sizes of configuration, velocity and constraint rows.
+        rank: rank of the constraint rows at the last evaluation (below ``rows`` where some are redundant: then the motion is
+            unique, the split of forces is not).
+
+    Raises:
+        ModelError: a joint that moves no inertia; an effect that does not fit the tree.
+    """
+
+    def __init__(self, tree: Tree, effects: Sequence[Effect] = (), integrator: str = RUNGE_KUTTA) -> None:
+        if integrator not in INTEGRATORS:
+            raise ModelError(f"integrator '{integrator}' is unknown: known are {list(INTEGRATORS)}")
+        for effect in effects:
+            effect.check(tree)
+        self.tree, self.effects, self.integrator = tree, tuple(effects), integrator
+        self._labels: list[tuple[str, int, int]] = []
+        pairs: list[PointPair] = []
+        for effect in effects:
+            own = effect.point_pairs(tree)
+            if own:
+                self._labels.append((effect.label, len(pairs), len(pairs) + len(own)))
+                pairs.extend(own)
+        self.nq, self.nv = tree.nq, tree.nv
+        self.rows = sum(1 if pair.length is not None else len(pair.directions) for pair in pairs)
+        self.rank = 0
+        self._links, self._pairs = link_records(tree), pair_records(tree, pairs)
+        self._work = np.zeros(len(self._links), dtype=WORK)
+        self._rows = np.zeros((self.rows, 2 * self.nv + 2 * self.rows + 3))
+        field = np.sum([effect.field() for effect in effects], axis=0) if effects else np.zeros(GRAVITY)
+        numbers = [effect.parameters(tree) for effect in effects if effect.compiled is not None]
+        self._parameters = np.concatenate([field, *numbers])
+        self._module = step_module(tree, effects, bool(pairs), integrator)
+        self._system = (self._links, self._work, self._pairs, self._rows, self._parameters)
+        self._scratch = np.zeros((10, max(self.nq, self.nv)))
+        self._still, self._vdot = np.zeros(self.nv), np.zeros(self.nv)
+        self._tangent: tuple[np.ndarray, ...] | None = None
+        self._check_inertia()
+
+    def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray | None = None) -> np.ndarray:
+        """(nv,) vdot at q and v under the effects and generalized forces tau (nv,); fills ``rank``."""
+        vdot = np.zeros(self.nv)
+        extra = self._still if tau is None else tau
+        self.rank = self._module.evaluate(*self._system, q, v, extra, 0.0, vdot, self._scratch[:3, : self.nv])
+        return vdot
+
+    def advance(self, q: np.ndarray, v: np.ndarray, h: float, count: int = 1, tau: np.ndarray | None = None) -> None:
+        """Move q and v in place by count steps of h seconds, under constant extra forces tau (nv,).
+
+        Raises:
+            SimulationError: the motion left the numbers (a step far too large for it).
+        """
+        extra = self._still if tau is None else tau
+        self.rank = self._module.advance(*self._system, q, v, extra, h, count, self._scratch)
+        if not (np.isfinite(q).all() and np.isfinite(v).all()):
+            raise SimulationError(
+                f"the motion is not finite after a step of {h:g} s: a smaller step size or the other integrator may do"
+            )
+
+    def linearise(
+        self, q: np.ndarray, v: np.ndarray, h: float, force_noise: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Move q and v in place by one step as ``advance`` does; return F and G, (2 nv, 2 nv) each.
+
+        F is the derivative of the new error state (tangent of q, v) by the old. G G^T is the covariance that white
+        generalized forces of density force_noise (nv,) [N sqrt(s) or N m sqrt(s)] add. Both lie in the tangent space of the
+        constraints.
+        """
+        nv, m = self.nv, self.rows
+        if self._tangent is None:
+            self._tangent = (
+                np.zeros((2 * nv, nv)),
+                np.zeros((2 * nv + 4 * m, nv)),
+                np.zeros((7, nv, 2 * nv)),
+                np.zeros(nv, dtype=FREEDOM),
+                np.zeros(len(self._links), dtype=COMPOSITE),
+                np.zeros(nv, dtype=GAP),
+            )
+        F, G = np.empty((2 * nv, 2 * nv)), np.empty((2 * nv, 2 * nv))
+        self.rank = self._module.linearise(
+            *self._system, q, v, self._still, h, force_noise, F, G, *self._tangent, self._scratch
+        )
+        return F, G
+
+    def project(self, q: np.ndarray, v: np.ndarray) -> float:
+        """Put q and v onto the constraints in place, in the mass metric; return the position error left, m."""
+        if self.rows == 0:
+            return 0.0
+        return float(
+            constraint.project(
+                self._links, self._work, self._pairs, self._rows, q, v, self._scratch[:3, : self.nv]
+            )
+        )
+
+    def tangent_rows(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Constraint Jacobian A (rows, nv) and the derivative of A v by the tangent of q (rows, nv)."""
+        A, A_q = np.zeros((self.rows, self.nv)), np.zeros((self.rows, self.nv))
+        if self.rows:
+            self.linearise(q.copy(), v.copy(), 1e-6, self._still)
+            assert self._tangent is not None
+            _, matrices, _, freedoms, composites, gaps = self._tangent
+            self._module.tangent_rows(*self._system, q, v, A, A_q, matrices, freedoms, composites, gaps)
+        return A, A_q
+
+    def constraint_error(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """(rows,) how far q is off the constraints, m."""
+        out = np.zeros(self.rows)
+        self.move(q, v)
+        constraint.place(self._work, self._pairs)
+        constraint.position_error(self._pairs, out)
+        return out
+
+    def move(self, q: np.ndarray, v: np.ndarray) -> None:
+        """Bring the kinematics up to date for ``pose``, ``velocity``, ``jacobian`` and ``energy``."""
+        kinematics.move(self._links, self._work, q, v)
+
+    def pose(self, part: str) -> tuple[np.ndarray, np.ndarray]:
+        """Position (3,) m and rotation matrix (3, 3), part to world, of a part's frame; needs ``move``."""
+        frame = self.tree.frame(part)
+        own = _matrix(frame.orientation)
+        if frame.link < 0:
+            return frame.position.copy(), own
+        here = self._work[frame.link]
+        R = here["rotation"].reshape(3, 3)
+        return here["origin"] + R @ frame.position, R @ own
+
+    def velocity(self, part: str) -> tuple[np.ndarray, np.ndarray]:
+        """Linear and angular velocity, (3,) m/s and (3,) rad/s, world axes, of a part's frame; needs ``move``."""
+        frame = self.tree.frame(part)
+        if frame.link < 0:
+            return np.zeros(3), np.zeros(3)
+        here = self._work[frame.link]
+        lever = here["rotation"].reshape(3, 3) @ frame.position
+        return here["velocity"] + np.cross(here["omega"], lever), here["omega"].copy()
+
+    def jacobian(self, part: str, point: np.ndarray) -> np.ndarray:
+        """(6, nv): angular velocity of a part and velocity of a point in its frame (3,), world axes, per v; needs ``move``."""
+        frame = self.tree.frame(part)
+        out = np.zeros((6, self.nv))
+        kinematics.point_jacobian(
+            self._links, self._work, frame.link, frame.position + _matrix(frame.orientation) @ point, out
+        )
+        return out
+
+    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+        """(nv, nv) generalized inertia at q."""
+        M = np.zeros((self.nv, self.nv))
+        self.move(q, self._still)
+        newton_euler.mass_matrix(self._links, self._work, M)
+        return M
+
+    def inverse_dynamics(self, q: np.ndarray, v: np.ndarray, vdot: np.ndarray) -> np.ndarray:
+        """(nv,) generalized forces that produce vdot beside gravity; effects that push are not counted in."""
+        tau = np.zeros(self.nv)
+        self.move(q, v)
+        newton_euler.inverse_dynamics(self._links, self._work, vdot, self._parameters[:GRAVITY], tau)
+        return tau
+
+    def energy(self) -> float:
+        """Kinetic energy plus potential energy in the uniform field, J, zero height at the world's origin; needs ``move``."""
+        total = 0.0
+        for link, here in zip(self._links, self._work, strict=True):
+            center = here["origin"] + here["center"]
+            rate = here["velocity"] + np.cross(here["omega"], here["center"])
+            xx, xy, xz, yy, yz, zz = here["inertia"]
+            inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            total += 0.5 * link["mass"] * (rate @ rate) + 0.5 * here["omega"] @ inertia @ here["omega"]
+            total -= link["mass"] * (self._parameters[:GRAVITY] @ center)
+        return float(total)
+
+    def wrenches(self, q: np.ndarray, v: np.ndarray, vdot: np.ndarray | None = None) -> dict[str, Wrench]:
+        """The wrench ON a part BY each joint and constraint effect, by name, under the scene's own acceleration.
+
+        With vdot given (a motion that was measured, not predicted), the joints' wrenches are what that motion needs, and
+        constraint effects are left out: inverse dynamics cannot tell them from joint forces.
+        """
+        gravity = self._parameters[:GRAVITY]
+        out: dict[str, Wrench] = {}
+        if vdot is None:
+            self.rank = self._module.evaluate(
+                *self._system, q, v, self._still, 0.0, self._vdot, self._scratch[:3, : self.nv]
+            )
+            constraint.load_links(self._work, self._pairs)
+            for label, first, last in self._labels:
+                own = self._pairs[first:last]
+                point = own[0]["b"]
+                moment = np.sum([np.cross(pair["b"] - point, pair["force"]) for pair in own], axis=0)
+                out[label] = Wrench(own["force"].sum(axis=0), moment, point.copy())
+        else:
+            kinematics.move(self._links, self._work, q, v)
+            newton_euler.spread(self._links, self._work, vdot, gravity)
+        newton_euler.transmit(self._links, self._work)
+        for link, here in zip(self.tree.links, self._work, strict=True):
+            out[link.joint.name] = Wrench(
+                here["bias_force"].copy(), here["bias_moment"].copy(), here["origin"].copy()
+            )
+        return out
+
+    def _check_inertia(self) -> None:
+        """Refuse joints that move no inertia, in any of a few postures (a point mass on a joint's axis, say)."""
+        rng = np.random.default_rng(0)
+        worst = None
+        for _ in range(3):
+            q = self.tree.integrate(self.tree.neutral(), rng.normal(size=self.nv))
+            M = self.mass_matrix(q)
+            scale = np.sqrt(np.diag(M))
+            if np.any(scale == 0.0):
+                worst = int(np.argmin(scale))
+            else:
+                values, vectors = np.linalg.eigh(M / np.outer(scale, scale))
+                if values[0] > SINGULAR:
+                    return
+                worst = int(np.argmax(np.abs(vectors[:, 0])))
+        if worst is not None:
+            raise ModelError(
+                f"'{self.tree.freedom_names[worst]}' moves no inertia: give what it carries a mass off its axis or an inertia"
+            )
+
+
+def _matrix(q: np.ndarray) -> np.ndarray:
+    from physics_prior import rotations
+
+    return rotations.matrix_from_quaternion(q)

@@ -1,0 +1,288 @@
+"""The step of a scene, compiled: evaluate, advance, linearise.
+
+This file is the step of a scene without force effects and without constraints. For any other scene the composer
+(dynamics/compose.py) writes a copy of it into the kernel cache with the lines marked ``scene`` replaced, so that a
+scene's step holds the effects that it names and nothing else.
+
+``system`` stands for (links, work, pairs, rows, parameters): records of the links, point pairs and constraint rows (see
+records.py, constraint.py), and the numbers of the effects, gravity first.
+"""
+
+import math
+
+from physics_prior.dynamics.articulated_body import accelerate, factorize
+from physics_prior.dynamics.constraint import constrain_acceleration, multiply, place, project, respond
+from physics_prior.dynamics.constraint_derivatives import differentiate_rows
+from physics_prior.dynamics.derivatives import apply_inverse_mass, inverse_dynamics_derivatives, sweep
+from physics_prior.dynamics.gyroscopic import take_at_middle
+from physics_prior.dynamics.kernel import kernel
+from physics_prior.dynamics.kinematics import move
+from physics_prior.dynamics.manifold import displace, displacement_derivative, rate, rate_derivative
+from physics_prior.effects.none import differentiate_forces, forces  # scene: effects
+
+CONSTRAINED = False  # scene: constraints
+RUNGE_KUTTA = True  # scene: integrator
+
+
+@kernel
+def evaluate(links, work, pairs, rows, parameters, q, v, extra, step, vdot, spare):
+    """Fill vdot (nv,) at q and v under the effects and extra generalized forces (nv,); return the constraints' rank.
+
+    step > 0 takes gyroscopic torques at the middle of such a step. spare (3, nv) is scratch.
+    """
+    gravity, tau = parameters[:3], spare[2]
+    move(links, work, q, v)
+    if step > 0.0:
+        take_at_middle(links, work, step)
+    tau[:] = extra
+    forces(parameters, links, work, q, v, tau)
+    factorize(links, work)
+    accelerate(links, work, tau, gravity, vdot)
+    rank = 0
+    if CONSTRAINED:
+        rank = constrain_acceleration(links, work, pairs, rows, gravity, vdot, spare)
+    return rank
+
+
+@kernel
+def advance(links, work, pairs, rows, parameters, q, v, extra, h, count, scratch):
+    """Move q (nq,) and v (nv,) in place by count steps of h seconds; return the constraints' rank.
+
+    Semi-implicit Euler, or the classical Runge-Kutta method of order four in the coordinates theta of q0 [+] theta (Munthe-Kaas
+    1999). Constraints are projected after each step. extra (nv,) is constant; scratch (9, nv + 1) beside q0.
+    """
+    nv = v.shape[0]
+    spare, vdot, theta, middle = scratch[0:3, :nv], scratch[3, :nv], scratch[4, :nv], scratch[5, :nv]
+    theta_rate, theta_sum, v_sum = scratch[6, :nv], scratch[7, :nv], scratch[8, :nv]
+    start = scratch[9, : q.shape[0]]
+    rank = 0
+    for _ in range(count):
+        if RUNGE_KUTTA:
+            start[:] = q
+            middle[:] = v
+            theta[:] = 0.0
+            theta_sum[:] = 0.0
+            v_sum[:] = 0.0
+            for stage in range(4):
+                rank = evaluate(links, work, pairs, rows, parameters, q, middle, extra, 0.0, vdot, spare)
+                rate(links, theta, middle, theta_rate)
+                weight = h / 6.0 if stage == 0 or stage == 3 else h / 3.0
+                ahead = h if stage == 2 else 0.5 * h
+                for k in range(nv):
+                    theta_sum[k] += weight * theta_rate[k]
+                    v_sum[k] += weight * vdot[k]
+                    theta[k] = ahead * theta_rate[k]
+                    middle[k] = v[k] + ahead * vdot[k]
+                if stage < 3:
+                    displace(links, start, theta, q)
+            displace(links, start, theta_sum, q)
+            for k in range(nv):
+                v[k] += v_sum[k]
+        else:
+            rank = evaluate(links, work, pairs, rows, parameters, q, v, extra, h, vdot, spare)
+            for k in range(nv):
+                v[k] += h * vdot[k]
+                theta[k] = h * v[k]
+            displace(links, q, theta, q)
+        if CONSTRAINED:
+            project(links, work, pairs, rows, q, v, spare)
+    return rank
+
+
+@kernel
+def differentiate(links, work, pairs, rows, parameters, q, v, step, derivative, matrices, freedoms, composites, gaps, spare):
+    """Fill derivative (2 nv, nv): row j is the derivative of vdot by the j-th tangent of q, row nv + j by v_j.
+
+    Needs ``evaluate`` at the same state. matrices (2, nv, nv) and (4, m, nv) in ``constraint_matrices`` are scratch.
+    """
+    nv = v.shape[0]
+    gravity = parameters[:3]
+    tau_q, tau_v = matrices[0:nv], matrices[nv : 2 * nv]
+    sweep(links, work, gravity, step, freedoms, composites)
+    inverse_dynamics_derivatives(links, freedoms, composites, tau_q, tau_v)
+    m = rows.shape[0]
+    A, A_q = matrices[2 * nv : 2 * nv + m], matrices[2 * nv + m : 2 * nv + 2 * m]
+    rows_q, rows_v = matrices[2 * nv + 2 * m : 2 * nv + 3 * m], matrices[2 * nv + 3 * m : 2 * nv + 4 * m]
+    if CONSTRAINED:
+        differentiate_rows(
+            links, work, pairs, freedoms, composites, gravity, gaps, A, A_q, rows_q, rows_v, tau_q
+        )
+    for i in range(nv):
+        for j in range(nv):
+            tau_q[i, j] = -tau_q[i, j]
+            tau_v[i, j] = -tau_v[i, j]
+    differentiate_forces(parameters, links, work, q, v, tau_q, tau_v)
+    for i in range(nv):
+        for j in range(nv):
+            derivative[j, i] = tau_q[i, j]
+            derivative[nv + j, i] = tau_v[i, j]
+    apply_inverse_mass(links, work, derivative, spare)
+    if CONSTRAINED:
+        for j in range(2 * nv):
+            for r in range(m):
+                total = rows_q[r, j] if j < nv else rows_v[r, j - nv]
+                for k in range(nv):
+                    total += A[r, k] * derivative[j, k]
+                rows[r, 2 * nv + 2 * m] = -total
+            multiply(rows, nv)
+            respond(links, work, rows, nv, spare[0], spare[1])
+            for k in range(nv):
+                derivative[j, k] += spare[1, k]
+
+
+@kernel
+def _combine(derivative, q_x, v_x, out):
+    """Fill out (nv, k): the derivative of vdot from those of q and v, (nv, k) each."""
+    nv = v_x.shape[0]
+    out[:, :] = 0.0
+    for j in range(nv):
+        for i in range(nv):
+            by_q, by_v = derivative[j, i], derivative[nv + j, i]
+            for c in range(out.shape[1]):
+                out[i, c] += by_q * q_x[j, c] + by_v * v_x[j, c]
+
+
+@kernel
+def project_columns(links, work, pairs, rows, A, A_q, columns, spare):
+    """Put the columns (2 nv, k) of errors of q and v onto the constraints' tangent space, in the mass metric.
+
+    A dq = 0 and A dv + d(A v)/dq dq = 0: the covariance then has no mass in forbidden directions.
+    """
+    nv, m = A.shape[1], A.shape[0]
+    for c in range(columns.shape[1]):
+        for part in range(2):
+            for r in range(m):
+                total = 0.0
+                for k in range(nv):
+                    total += A[r, k] * columns[part * nv + k, c]
+                    if part == 1:
+                        total += A_q[r, k] * columns[k, c]
+                rows[r, 2 * nv + 2 * m] = -total
+            multiply(rows, nv)
+            respond(links, work, rows, nv, spare[0], spare[1])
+            for k in range(nv):
+                columns[part * nv + k, c] += spare[1, k]
+
+
+@kernel
+def tangent_rows(links, work, pairs, rows, parameters, q, v, A, A_q, matrices, freedoms, composites, gaps):
+    """Fill A (m, nv) and A_q (m, nv) at a state that ``project`` has just left: its factors still stand."""
+    nv, m = v.shape[0], rows.shape[0]
+    move(links, work, q, v)
+    place(work, pairs)
+    sweep(links, work, parameters[:3], 0.0, freedoms, composites)
+    differentiate_rows(
+        links, work, pairs, freedoms, composites, parameters[:3], gaps, A, A_q,
+        matrices[2 * nv + 2 * m : 2 * nv + 3 * m], matrices[2 * nv + 3 * m : 2 * nv + 4 * m], matrices[0:nv],
+    )
+
+
+@kernel
+def linearise(
+    links, work, pairs, rows, parameters, q, v, extra, h, force_noise, F, G,
+    derivative, matrices, stages, freedoms, composites, gaps, scratch,
+):
+    """Make one step as ``advance`` does and fill its derivatives.
+
+    F (2 nv, 2 nv): the new error by the old. G (2 nv, 2 nv): a factor of what white generalized forces of density
+    force_noise (nv,) [N sqrt(s), N m sqrt(s)] add over the step: G G^T = integral of B B^T with B = M^-1 force_noise, the
+    double integrator's exact second moments. stages (7, nv, 2 nv), matrices (2 nv + 4 m, nv) are scratch.
+    """
+    nv = v.shape[0]
+    spare, vdot, theta, middle = scratch[0:3, :nv], scratch[3, :nv], scratch[4, :nv], scratch[5, :nv]
+    theta_rate, theta_sum, v_sum = scratch[6, :nv], scratch[7, :nv], scratch[8, :nv]
+    start = scratch[9, : q.shape[0]]
+    start_x, theta_x, v_x, q_x = stages[0], stages[1], stages[2], stages[3]
+    rate_x, theta_sum_x, v_sum_x = stages[4], stages[5], stages[6]
+    start_x[:, :] = 0.0
+    v_x[:, :] = 0.0
+    theta_x[:, :] = 0.0
+    theta_sum_x[:, :] = 0.0
+    v_sum_x[:, :] = 0.0
+    for k in range(nv):
+        start_x[k, k] = 1.0
+        v_x[k, nv + k] = 1.0
+        theta[k], theta_sum[k], v_sum[k] = 0.0, 0.0, 0.0
+    start[:] = q
+    middle[:] = v
+    q_x[:, :] = start_x
+    step = 0.0 if RUNGE_KUTTA else h
+    m = rows.shape[0]
+    A, A_q = matrices[2 * nv : 2 * nv + m], matrices[2 * nv + m : 2 * nv + 2 * m]
+    for stage in range(4 if RUNGE_KUTTA else 1):
+        rank = evaluate(links, work, pairs, rows, parameters, q, middle, extra, step, vdot, spare)
+        differentiate(
+            links, work, pairs, rows, parameters, q, middle, step, derivative, matrices, freedoms, composites, gaps, spare
+        )
+        if stage == 0:
+            _force_noise(links, work, force_noise, h, G, spare)
+            if CONSTRAINED:
+                project_columns(links, work, pairs, rows, A, A_q, G, spare)
+        if RUNGE_KUTTA:
+            rate(links, theta, middle, theta_rate)
+            rate_derivative(links, theta, middle, theta_x, v_x, rate_x)
+            weight = h / 6.0 if stage == 0 or stage == 3 else h / 3.0
+            ahead = h if stage == 2 else 0.5 * h
+            _accumulate(weight, rate_x, theta_sum_x)
+            for k in range(nv):
+                theta_sum[k] += weight * theta_rate[k]
+                v_sum[k] += weight * vdot[k]
+                theta[k] = ahead * theta_rate[k]
+                middle[k] = v[k] + ahead * vdot[k]
+            theta_x[:, :] = 0.0
+            _accumulate(ahead, rate_x, theta_x)
+            _combine(derivative, q_x, v_x, rate_x)
+            _accumulate(weight, rate_x, v_sum_x)
+            v_x[:, :] = 0.0
+            for k in range(nv):
+                v_x[k, nv + k] = 1.0
+            _accumulate(ahead, rate_x, v_x)
+            if stage < 3:
+                displace(links, start, theta, q)
+                displacement_derivative(links, theta, start_x, theta_x, q_x)
+        else:
+            _combine(derivative, q_x, v_x, rate_x)
+            _accumulate(h, rate_x, v_sum_x)
+            for k in range(nv):
+                v_sum[k] = h * vdot[k]
+                theta_sum[k] = h * (v[k] + v_sum[k])
+                theta_sum_x[k, nv + k] = h
+            _accumulate(h, v_sum_x, theta_sum_x)
+    displace(links, start, theta_sum, q)
+    displacement_derivative(links, theta_sum, start_x, theta_sum_x, q_x)
+    for k in range(nv):
+        v[k] += v_sum[k]
+        v_sum_x[k, nv + k] += 1.0
+        F[k] = q_x[k]
+        F[nv + k] = v_sum_x[k]
+    if CONSTRAINED:
+        project(links, work, pairs, rows, q, v, spare)
+        tangent_rows(links, work, pairs, rows, parameters, q, v, A, A_q, matrices, freedoms, composites, gaps)
+        project_columns(links, work, pairs, rows, A, A_q, F, spare)
+        project_columns(links, work, pairs, rows, A, A_q, G, spare)
+    return rank
+
+
+@kernel
+def _accumulate(s, source, out):
+    """Add s source to out."""
+    for i in range(out.shape[0]):
+        for c in range(out.shape[1]):
+            out[i, c] += s * source[i, c]
+
+
+@kernel
+def _force_noise(links, work, force_noise, h, G, spare):
+    """Fill G (2 nv, 2 nv) from white generalized forces over h seconds; needs factors."""
+    nv = force_noise.shape[0]
+    G[:, :] = 0.0
+    near, far, late = h * math.sqrt(h / 3.0), 0.5 * math.sqrt(3.0 * h), 0.5 * math.sqrt(h)
+    for j in range(nv):
+        if force_noise[j] > 0.0:
+            spare[2, :] = 0.0
+            spare[2, j] = force_noise[j]
+            apply_inverse_mass(links, work, spare[2:3], spare)
+            for k in range(nv):
+                G[k, j] = near * spare[2, k]
+                G[nv + k, j] = far * spare[2, k]
+                G[nv + k, nv + j] = late * spare[2, k]

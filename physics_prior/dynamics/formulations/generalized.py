@@ -25,9 +25,7 @@ def mass_matrix(tree: Tree, q: np.ndarray) -> np.ndarray:
     return np.asarray(T.T @ (bodies.diagonal[:, None] * T))
 
 
-def inverse_dynamics(
-    tree: Tree, q: np.ndarray, v: np.ndarray, vdot: np.ndarray, gravity: np.ndarray
-) -> np.ndarray:
+def inverse_dynamics(tree: Tree, q: np.ndarray, v: np.ndarray, vdot: np.ndarray, gravity: np.ndarray) -> np.ndarray:
     """Return the forces tau (nv,) that accelerate the tree by vdot (nv,): equation 6 from left to right.
 
     At vdot = 0 they are the bias: Coriolis, centrifugal and gravity terms. gravity: (3,) m/s^2, world.
@@ -38,9 +36,7 @@ def inverse_dynamics(
     return np.asarray(T.T @ (bodies.diagonal * (T @ vdot + Tdot @ v) - f))
 
 
-def accelerations(
-    tree: Tree, q: np.ndarray, v: np.ndarray, tau: np.ndarray, gravity: np.ndarray
-) -> np.ndarray:
+def accelerations(tree: Tree, q: np.ndarray, v: np.ndarray, tau: np.ndarray, gravity: np.ndarray) -> np.ndarray:
     """Forward dynamics: vdot (nv,) under joint forces tau (nv,) and gravity (3,) m/s^2.
 
     Raises:
@@ -88,9 +84,7 @@ def mixed_accelerations(
     return ConstrainedMotion(vdot, point_pairs.forces(closed, state, multipliers), rank)
 
 
-def attach(
-    tree: Tree, q: np.ndarray, v: np.ndarray, pairs: Sequence[PointPair]
-) -> tuple[np.ndarray, np.ndarray, int]:
+def attach(tree: Tree, q: np.ndarray, v: np.ndarray, pairs: Sequence[PointPair]) -> tuple[np.ndarray, np.ndarray, int]:
     """Velocity after making attachments at once, the impulses that it takes and their rank (equation 9).
 
     [M A^T; A 0] [v+; L] = [M v-; 0]: the impact is plastic, v+ is the velocity nearest to v- in the mass
@@ -108,9 +102,7 @@ def attach(
     return after, point_pairs.forces(closed, state, multipliers), rank
 
 
-def constraint_jacobian(
-    tree: Tree, q: np.ndarray, pairs: Sequence[PointPair]
-) -> tuple[np.ndarray, np.ndarray]:
+def constraint_jacobian(tree: Tree, q: np.ndarray, pairs: Sequence[PointPair]) -> tuple[np.ndarray, np.ndarray]:
     """Return the residual e(q), (rows,) m, of point pairs and its Jacobian A T, (rows, nv): edot = A T v."""
     bodies = Bodies.of(tree)
     k = kinematics(tree, q, np.zeros(tree.nv))

@@ -78,9 +78,7 @@ def kinematics(tree: Tree, q: np.ndarray, v: np.ndarray) -> Kinematics:
         angular_rate[i, :, link.v] += spin @ angular[i, :, link.v]
         if kind is JointKind.PRISMATIC:
             linear_rate[i, :, link.v] += spin @ linear[i, :, link.v]
-    return Kinematics(
-        position, orientation, velocity, angular_velocity, linear, angular, linear_rate, angular_rate
-    )
+    return Kinematics(position, orientation, velocity, angular_velocity, linear, angular, linear_rate, angular_rate)
 
 
 def joint_pose(link: Link, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,9 +8,10 @@ from physics_prior import rotations
 from physics_prior.dynamics.formulations import constrained_motion, generalized
 from physics_prior.dynamics.formulations.kinematics import kinematics
 from physics_prior.dynamics.formulations.newton_euler import Bodies, C, Q, V, W
+from physics_prior.effects.attachment import Hinge
 from physics_prior.effects.effect import Anchor, PointPair
 from physics_prior.errors import ModelError, SimulationError
-from physics_prior.inertia import MassProperties
+from physics_prior.inertia import MassProperties, box
 from physics_prior.model import Joint, JointKind, Part, Tree
 
 GRAVITY = np.array([0.3, -0.2, -9.81])
@@ -167,9 +168,7 @@ def test_joint_wrenches_hold_the_joint_forces(moving, random_pairs, consistent_v
 def test_joint_wrench_is_the_attachment_force_of_the_same_chain():
     """A chain of ball joints, and the same bodies free but pinned by point pairs, feel the same forces."""
     rng = np.random.default_rng(1)
-    bodies = [
-        MassProperties(m, rng.normal(size=3), np.diag(i)) for m, i in ((1.0, [1, 2, 2.5]), (2.0, [2, 1.5, 1]))
-    ]
+    bodies = [MassProperties(m, rng.normal(size=3), np.diag(i)) for m, i in ((1.0, [1, 2, 2.5]), (2.0, [2, 1.5, 1]))]
     parts = [Part("one", bodies[0]), Part("two", bodies[1])]
     elbow = rng.normal(size=3)
     chain = Tree(
@@ -241,9 +240,7 @@ def test_free_flight_conserves_energy_and_momenta(seed, random_tree, random_stat
     def invariants(q, v):
         state = bodies.state(kinematics(tree, q, v))
         momentum = bodies.mass[:, None] * state[:, V]
-        angular = np.cross(state[:, C], momentum) + rotations.rotate(
-            state[:, Q], bodies.moments * state[:, W]
-        )
+        angular = np.cross(state[:, C], momentum) + rotations.rotate(state[:, Q], bodies.moments * state[:, W])
         return np.hstack([momentum.sum(0), angular.sum(0), generalized.energy(tree, q, v, np.zeros(3))[0]])
 
     start = invariants(qs[0], vs[0])
@@ -296,6 +293,35 @@ def test_heavy_top_follows_the_reference(heavy_top, trajectory, reference):
     turn = rotations.log(rotations.multiply(rotations.conjugate(attitude), q))
     np.testing.assert_allclose(turn, 0.0, rtol=0.0, atol=1e-8)
     np.testing.assert_allclose(v[:, 1], expected["wy_body"], rtol=1e-10)
+
+
+def test_bricard_closes_with_a_redundant_row(trajectory, reference):
+    """Six hinges of which five rows close the loop and four would do: the motion is unique all the same."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, -1, 0], [1, -1, 1], [0, -1, 1], [0, 0, 1]], dtype=float)
+    axes = np.eye(3)[[1, 2, 0, 1, 2, 0]]
+    parts, joints = [], []
+    for i in range(5):
+        reach = points[i + 1] - points[i]
+        inertia = box(1.0, np.where(np.abs(reach) > 0.5, 1.0, 0.1)).inertia
+        parts.append(Part(f"rod{i}", MassProperties(1.0, 0.5 * reach, inertia)))
+        under = f"rod{i - 1}" if i else "world"
+        place = points[i] - points[i - 1] if i else points[0]
+        joints.append(Joint(f"hinge{i}", JointKind.REVOLUTE, under, f"rod{i}", place, axis=axes[i]))
+    tree = Tree(parts, joints)
+    end = points[5] - points[4]
+    closing = Hinge(part="rod4", point=end, at=points[5], axis=axes[5], to_axis=axes[5])
+    loop = closing.point_pairs(tree)
+    gravity, rest = np.array([0.0, -9.81, 0.0]), np.zeros(5)
+
+    def motion(q, v):
+        return generalized.mixed_accelerations(tree, q, v, rest, gravity, loop)
+
+    expected = reference("A04_bricard_10s.csv")[:21]
+    qs, vs = trajectory(tree, rest, rest, expected["t"], lambda q, v: motion(q, v).acceleration)
+    for q, v, row in zip(qs, vs, expected, strict=True):
+        assert motion(q, v).rank == 4
+        corner = kinematics(tree, q, v).position[3]
+        np.testing.assert_allclose(corner, [row["P3x"], row["P3y"], row["P3z"]], rtol=0.0, atol=1e-10)  # measured 2e-12
 
 
 def test_pinocchio_agrees(moving):

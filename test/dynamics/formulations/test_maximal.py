@@ -54,9 +54,7 @@ def test_tree_moves_as_in_generalized_coordinates(moving):
 
 
 @pytest.mark.parametrize("copies", [1, 2])
-def test_constrained_tree_moves_as_in_generalized_coordinates(
-    copies, moving, random_pairs, consistent_velocity
-):
+def test_constrained_tree_moves_as_in_generalized_coordinates(copies, moving, random_pairs, consistent_velocity):
     rng, tree, q, v, tau = moving
     pairs = random_pairs(rng, tree, q, 2)
     v = consistent_velocity(tree, q, v, pairs)

@@ -57,9 +57,7 @@ def test_body_turns_as_euler_says(spinning):
     qdot = rotations.derivative(q, spin)
     qddot, _ = quaternion.rotational_motion(q, qdot, moments, torque)
     euler = (torque - np.cross(spin, moments * spin)) / moments
-    np.testing.assert_allclose(
-        rotations.angular_velocity_body(q, qddot), euler, rtol=0.0, atol=1e-13
-    )  # measured 3e-15
+    np.testing.assert_allclose(rotations.angular_velocity_body(q, qddot), euler, rtol=0.0, atol=1e-13)  # measured 3e-15
     assert q @ qddot == pytest.approx(-qdot @ qdot, abs=1e-14)
 
 
@@ -91,9 +89,7 @@ def test_tree_moves_as_in_generalized_coordinates(moving):
 
 
 @pytest.mark.parametrize("copies", [1, 2])
-def test_constrained_tree_moves_as_in_generalized_coordinates(
-    copies, moving, random_pairs, consistent_velocity
-):
+def test_constrained_tree_moves_as_in_generalized_coordinates(copies, moving, random_pairs, consistent_velocity):
     rng, tree, q, v, tau = moving
     pairs = random_pairs(rng, tree, q, 2)
     v = consistent_velocity(tree, q, v, pairs)
@@ -107,9 +103,7 @@ def test_constrained_tree_moves_as_in_generalized_coordinates(
     _, J = generalized.constraint_jacobian(tree, q, pairs * copies)
     if found.rank == len(J):  # where rows repeat, the split of the force is not unique
         bound = 1e-10 * (1.0 + np.abs(expected.forces).max())
-        np.testing.assert_allclose(
-            found.forces, expected.forces, rtol=0.0, atol=bound
-        )  # measured 2e-14 relative
+        np.testing.assert_allclose(found.forces, expected.forces, rtol=0.0, atol=bound)  # measured 2e-14 relative
 
 
 def test_states_and_trees_translate_into_each_other(moving):
@@ -145,9 +139,7 @@ def test_heavy_top_follows_the_reference(heavy_top, reference):
     states = integrate(system, heavy_top.neutral(), np.array([0.0, 150.0, -4.61538]), expected["t"])
     center = np.stack([expected[name] for name in "xyz"], axis=1)
     np.testing.assert_allclose(states[:, 0, :3], center, rtol=0.0, atol=1e-9)  # measured 2e-13
-    np.testing.assert_allclose(
-        np.linalg.norm(states[:, 0, Q], axis=1), 1.0, rtol=0.0, atol=1e-10
-    )  # measured 1e-12
+    np.testing.assert_allclose(np.linalg.norm(states[:, 0, Q], axis=1), 1.0, rtol=0.0, atol=1e-10)  # measured 1e-12
 
 
 def test_states_that_are_not_finite_are_refused(double_pendulum):

@@ -7,7 +7,7 @@ import numpy as np
 from physics_prior.model import JointKind, Link, Tree
 from physics_prior.scene.quantity import parse_quantity
 from physics_prior.scene.scene import Initial, Noise
-from physics_prior.scene.schema import Pose, Twist, parse_orientation
+from physics_prior.scene.schema import FreeNoiseSection, Pose, Twist, parse_orientation
 from physics_prior.scene.section import require_known, validate
 from physics_prior.scene.yaml_file import Place, shown
 
@@ -71,14 +71,8 @@ def _by_freedom(place: Place, tree: Tree, units: tuple[str, str]) -> np.ndarray:
 def _of_joint(place: Place, link: Link, units: tuple[str, str]) -> np.ndarray:
     kind, size = link.joint.kind, link.joint.nv
     if kind is JointKind.FREE and place.is_mapping:
-        for key in place.value:
-            require_known(place, key, ["linear", "angular"], "direction of a free joint", key)
-        parts = []
-        for key, unit in zip(("linear", "angular"), units, strict=True):
-            if key not in place:
-                raise place.error(f"'{key}' is missing: give linear and angular")
-            parts.append(_deviation(place[key], unit))
-        return np.repeat(parts, 3)
+        validate(FreeNoiseSection, place)
+        return np.repeat([_deviation(place["linear"], units[0]), _deviation(place["angular"], units[1])], 3)
     if kind is JointKind.FREE:
         if isinstance(place.value, str):
             raise place.error(

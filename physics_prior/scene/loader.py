@@ -33,9 +33,7 @@ def load_scene(name_or_path: str | Path) -> Scene:
     effects = _read_effects(top.get("effects"), tree)
     measurements = _read_measurements(top.get("measurements"), tree)
     if measurements and file.noise is None:
-        raise top.error(
-            "'noise' is missing: say how far to trust the model, for example 'noise: {force: 1e-3}'"
-        )
+        raise top.error("'noise' is missing: say how far to trust the model, for example 'noise: {force: 1e-3}'")
     return Scene(
         name=path.stem,
         path=path,
@@ -68,13 +66,12 @@ def _read_effects(place: Place, tree: Tree) -> tuple[Effect, ...]:
         except PhysicsPriorError as error:
             raise relocate(inner, error, known) from None
         except ValueError as error:
-            raise inner.error(str(error), "name") from None
+            raise inner.inside(("name",)).error(str(error)) from None
         if effect.label in [other.label for other in effects]:
-            raise inner.error(
-                f"name '{effect.label}' is another effect's: give this one its own 'name'", "name"
-            )
+            name = inner.inside(("name",))
+            raise name.error(f"'{effect.label}' is another effect's name: give this one its own 'name'")
         if held and effect.label in joints:
-            raise inner.error(f"name '{effect.label}' is a joint's: give this effect its own 'name'", "name")
+            raise inner.inside(("name",)).error(f"'{effect.label}' is a joint's name: give this effect its own")
         effects.append(effect)
     return tuple(effects)
 
@@ -121,7 +118,7 @@ def _read_measurements(place: Place, tree: Tree) -> tuple[MeasurementSource, ...
         source = validate(source_type, inner)
         source.check(tree, inner)
         if source.topic in [other.topic for other in sources]:
-            raise inner.error(f"topic '{source.topic}' is read twice: give each measurement its own", "topic")
+            raise inner["topic"].error(f"'{source.topic}' is read twice: give each measurement its own topic")
         sources.append(source)
     return tuple(sources)
 
@@ -133,6 +130,6 @@ def _read_readouts(place: Place, subject: Subject) -> tuple[Readout, ...]:
         readout = validate(readout_type, inner)
         readout.check(subject, inner)
         if readout.name in [other.name for other in readouts]:
-            raise inner.error(f"name '{readout.name}' is used by another readout: give each its own", "name")
+            raise inner.inside(("name",)).error(f"'{readout.name}' is another readout's name: give each its own")
         readouts.append(readout)
     return tuple(readouts)

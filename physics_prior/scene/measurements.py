@@ -35,7 +35,7 @@ class _PartSource(MeasurementSource):
 
     def check(self, tree: Tree, place: Place) -> None:
         """Check part, joint and marker names."""
-        require_known(place, self.part, part_names(tree), "part", "part")
+        require_known(place["part"], self.part, part_names(tree), "part")
 
 
 class PoseSource(_PartSource):
@@ -77,9 +77,9 @@ class PointsSource(MeasurementSource):
         seen: set[str] = set()
         for index, marker in enumerate(self.markers):
             here = place["markers"][index]
-            require_known(here, marker.part, part_names(tree), "part", "part")
+            require_known(here["part"], marker.part, part_names(tree), "part")
             if marker.name in seen:
-                raise here.error(f"name '{marker.name}' is another marker's: give each its own", "name")
+                raise here["name"].error(f"'{marker.name}' is another marker's name: give each its own")
             seen.add(marker.name)
 
 
@@ -100,7 +100,7 @@ class JointSource(MeasurementSource):
         """Check part, joint and marker names."""
         known = scalar_joint_names(tree)
         for name, joint in self.joints.items():
-            require_known(place["joints"], joint, known, "revolute or prismatic joint", name)
+            require_known(place["joints"][name], joint, known, "revolute or prismatic joint")
 
 
 SOURCES: dict[str, type[MeasurementSource]] = {

@@ -133,7 +133,8 @@ def build_tree(place: Place) -> Tree:
             check_name(name)
         except ValueError as error:
             raise place["parts"].error(str(error), name) from None
-        require_known(entry["joint"], part.joint.parent, ["world", *names], "part", "parent")
+        parent = entry["joint"].inside(("parent",))
+        require_known(parent, part.joint.parent, ["world", *names], "part")
         parts.append(_part(name, part, entry))
         joints.append(_joint(name, part.joint, entry["joint"]))
     try:
@@ -215,9 +216,7 @@ def _moments(place: Place) -> np.ndarray:
         )
     try:
         numbers = (
-            [[_moment(each) for each in row] for row in rows]
-            if matrix
-            else np.diag([_moment(row) for row in rows])
+            [[_moment(each) for each in row] for row in rows] if matrix else np.diag([_moment(row) for row in rows])
         )
     except ValueError as error:
         raise place.error(str(error)) from None

@@ -56,7 +56,10 @@ class JointReadout(Readout):
     def check(self, subject: Subject, place: Place) -> None:
         """Check that what it reads is there."""
         require_known(
-            place, self.joint, scalar_joint_names(subject.tree), "revolute or prismatic joint", "joint"
+            place.inside(("joint",)),
+            self.joint,
+            scalar_joint_names(subject.tree),
+            "revolute or prismatic joint",
         )
 
 
@@ -92,7 +95,7 @@ class AngleReadout(Readout):
 
     def check(self, subject: Subject, place: Place) -> None:
         """Check that what it reads is there."""
-        require_known(place, self.part, part_names(subject.tree), "part", "part")
+        require_known(place["part"], self.part, part_names(subject.tree), "part")
 
 
 class PointReadout(Readout):
@@ -106,7 +109,7 @@ class PointReadout(Readout):
 
     def check(self, subject: Subject, place: Place) -> None:
         """Check that what it reads is there."""
-        require_known(place, self.part, part_names(subject.tree), "part", "part")
+        require_known(place["part"], self.part, part_names(subject.tree), "part")
 
 
 class EnergyReadout(Readout):
@@ -141,12 +144,11 @@ class ForceReadout(Readout):
 
     def check(self, subject: Subject, place: Place) -> None:
         """Check that what it reads is there."""
-        require_known(place, self.constraint, subject.forces(), "constraint force", "constraint")
+        require_known(place.inside(("constraint",)), self.constraint, subject.forces(), "constraint force")
 
 
 READOUTS: dict[str, type[Readout]] = {
-    readout.kind: readout
-    for readout in (JointReadout, AngleReadout, PointReadout, EnergyReadout, ForceReadout)
+    readout.kind: readout for readout in (JointReadout, AngleReadout, PointReadout, EnergyReadout, ForceReadout)
 }
 """Every kind of readout, by its key in the scene file."""
 

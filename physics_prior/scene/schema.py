@@ -27,9 +27,7 @@ _AXES = {
 def check_name(name: str) -> str:
     """Return a name that can stand in a topic, a plot and a sentence; ValueError otherwise."""
     if not _NAME.fullmatch(name):
-        raise ValueError(
-            f"{shown(name)} is not a name: use letters, digits, '_', '.' and '-', a letter first"
-        )
+        raise ValueError(f"{shown(name)} is not a name: use letters, digits, '_', '.' and '-', a letter first")
     return name
 
 
@@ -46,9 +44,7 @@ def _axis(value: Any) -> tuple[float, float, float]:
     numbers = _numbers(value, 3)
     length = float(np.linalg.norm(numbers)) if numbers is not None else 0.0
     if numbers is None or not 1e-9 < length < 1e60:
-        raise ValueError(
-            f"{shown(value)} is not an axis: give one of {list(_AXES)} or three numbers, not all zero"
-        )
+        raise ValueError(f"{shown(value)} is not an axis: give one of {list(_AXES)} or three numbers, not all zero")
     x, y, z = (numbers / length).tolist()
     return x, y, z
 
@@ -203,6 +199,13 @@ class NoiseSection(Section):
     force: JsonValue
     jerk: JsonValue = 100.0
     velocity: JsonValue = 10.0
+
+
+class FreeNoiseSection(Section):
+    """Noise of a free joint as written: along lines and about axes."""
+
+    linear: JsonValue
+    angular: JsonValue
 
 
 class InitialSection(Section):

@@ -54,7 +54,7 @@ def validate(model: type[Model], place: Place, value: Any = None) -> Model:
     """
     value = place.value if value is None else value
     try:
-        return model.model_validate_json(json.dumps(value), strict=not issubclass(model, Section))
+        return model.model_validate_json(json.dumps(value), strict=None if issubclass(model, Section) else True)
     except ValidationError as error:
         raise _scene_error(error, model, place) from None
 
@@ -78,7 +78,7 @@ def choose(place: Place, kinds: Mapping[str, Kind], noun: str) -> tuple[str, Kin
 
 
 def require_known(place: Place, name: str, known: list[str], noun: str, key: str | None = None) -> None:
-    """Refuse a name, the value of a place or its ``key``, that is not among the known ones of a noun's kind.
+    """Refuse a name, the value of a place or a ``key`` in it, that is not among the known ones of its kind.
 
     Raises:
         SceneError: naming the nearest known name, and all of them.
@@ -146,6 +146,7 @@ def _sentence(error: ErrorDetails, value: str) -> str:
     expected = {
         "float_type": "a number",
         "int_type": "a whole number",
+        "int_from_float": "a whole number",
         "string_type": "a text",
         "bool_type": "true or false",
         "tuple_type": "a list",

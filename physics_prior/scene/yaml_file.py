@@ -135,9 +135,7 @@ def read_yaml(path: Path) -> Place:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
-        raise SceneError(
-            f"{path}:{line}: byte 0x{raw[error.start]:02x} is not UTF-8: save it as UTF-8"
-        ) from None
+        raise SceneError(f"{path}:{line}: byte 0x{raw[error.start]:02x} is not UTF-8: save it as UTF-8") from None
     if len(raw) > MAXIMUM_BYTES:
         raise SceneError(f"{path}: has more than {MAXIMUM_BYTES} bytes, the most that is accepted")
     try:

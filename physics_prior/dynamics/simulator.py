@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from physics_prior.dynamics import articulated_body, constraint, kinematics, newton_euler
-from physics_prior.dynamics.compose import GRAVITY, INTEGRATORS, RUNGE_KUTTA, step_module
+from physics_prior import rotations
+from physics_prior.dynamics import constraint, kinematics, manifold, newton_euler
+from physics_prior.dynamics.compose import GRAVITY, INTEGRATORS, RUNGE_KUTTA, pack_parameters, step_module
 from physics_prior.dynamics.constraint_derivatives import GAP
 from physics_prior.dynamics.derivatives import COMPOSITE, FREEDOM
 from physics_prior.dynamics.records import WORK, link_records, pair_records
@@ -34,6 +35,7 @@ class Simulator:
     Attributes:
         tree, effects, integrator: what it was built from.
         nq, nv, rows: sizes of configuration, velocity and constraint rows.
+        wrench_names: whose wrenches there are: moving joints, then effects that hold something.
         rank: rank of the constraint rows at the last evaluation (below ``rows`` where some are redundant: then the motion is
             unique, the split of forces is not).
 
@@ -54,18 +56,17 @@ class Simulator:
             if own:
                 self._labels.append((effect.label, len(pairs), len(pairs) + len(own)))
                 pairs.extend(own)
+        self.wrench_names = [link.joint.name for link in tree.links] + [label for label, _, _ in self._labels]
         self.nq, self.nv = tree.nq, tree.nv
         self.rows = sum(1 if pair.length is not None else len(pair.directions) for pair in pairs)
         self.rank = 0
         self._links, self._pairs = link_records(tree), pair_records(tree, pairs)
         self._work = np.zeros(len(self._links), dtype=WORK)
         self._rows = np.zeros((self.rows, 2 * self.nv + 2 * self.rows + 3))
-        field = np.sum([effect.field() for effect in effects], axis=0) if effects else np.zeros(GRAVITY)
-        numbers = [effect.parameters(tree) for effect in effects if effect.compiled is not None]
-        self._parameters = np.concatenate([field, *numbers])
-        self._module = step_module(tree, effects, bool(pairs), integrator)
+        self._parameters = pack_parameters(tree, effects)
+        self._module = step_module(effects, bool(pairs), integrator)
         self._system = (self._links, self._work, self._pairs, self._rows, self._parameters)
-        self._scratch = np.zeros((10, max(self.nq, self.nv)))
+        self._start, self._scratch = np.zeros(self.nq), np.zeros((9, self.nv))
         self._still, self._vdot = np.zeros(self.nv), np.zeros(self.nv)
         self._tangent: tuple[np.ndarray, ...] | None = None
         self._check_inertia()
@@ -74,7 +75,7 @@ class Simulator:
         """(nv,) vdot at q and v under the effects and generalized forces tau (nv,); fills ``rank``."""
         vdot = np.zeros(self.nv)
         extra = self._still if tau is None else tau
-        self.rank = self._module.evaluate(*self._system, q, v, extra, 0.0, vdot, self._scratch[:3, : self.nv])
+        self.rank = self._module.evaluate(*self._system, q, v, extra, 0.0, vdot, self._scratch[:3])
         return vdot
 
     def advance(self, q: np.ndarray, v: np.ndarray, h: float, count: int = 1, tau: np.ndarray | None = None) -> None:
@@ -84,7 +85,7 @@ class Simulator:
             SimulationError: the motion left the numbers (a step far too large for it).
         """
         extra = self._still if tau is None else tau
-        self.rank = self._module.advance(*self._system, q, v, extra, h, count, self._scratch)
+        self.rank = self._module.advance(*self._system, q, v, extra, h, count, self._start, self._scratch)
         if not (np.isfinite(q).all() and np.isfinite(v).all()):
             raise SimulationError(
                 f"the motion is not finite after a step of {h:g} s: a smaller step size or the other integrator may do"
@@ -111,7 +112,7 @@ class Simulator:
             )
         F, G = np.empty((2 * nv, 2 * nv)), np.empty((2 * nv, 2 * nv))
         self.rank = self._module.linearise(
-            *self._system, q, v, self._still, h, force_noise, F, G, *self._tangent, self._scratch
+            *self._system, q, v, self._still, h, force_noise, F, G, *self._tangent, self._start, self._scratch
         )
         return F, G
 
@@ -119,11 +120,23 @@ class Simulator:
         """Put q and v onto the constraints in place, in the mass metric; return the position error left, m."""
         if self.rows == 0:
             return 0.0
-        return float(
-            constraint.project(
-                self._links, self._work, self._pairs, self._rows, q, v, self._scratch[:3, : self.nv]
+        return float(constraint.project(self._links, self._work, self._pairs, self._rows, q, v, self._scratch[:3]))
+
+    def displaced(self, q: np.ndarray, delta: np.ndarray) -> np.ndarray:
+        """(nq,) q moved by a tangent vector (nv,), as Tree.integrate does, compiled."""
+        out = np.empty(self.nq)
+        manifold.displace(self._links, q, delta, out)
+        return out
+
+    def constrain(self, q: np.ndarray, v: np.ndarray, factor: np.ndarray) -> None:
+        """Put q and v, and the columns of a factor (2 nv, k) of their errors, onto the constraints, in place."""
+        if self.rows:
+            self.project(q, v)
+            A, A_q = self.tangent_rows(q, v)
+            self.project(q, v)
+            self._module.project_columns(
+                self._links, self._work, self._pairs, self._rows, A, A_q, factor, self._scratch[:3]
             )
-        )
 
     def tangent_rows(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Constraint Jacobian A (rows, nv) and the derivative of A v by the tangent of q (rows, nv)."""
@@ -150,7 +163,7 @@ class Simulator:
     def pose(self, part: str) -> tuple[np.ndarray, np.ndarray]:
         """Position (3,) m and rotation matrix (3, 3), part to world, of a part's frame; needs ``move``."""
         frame = self.tree.frame(part)
-        own = _matrix(frame.orientation)
+        own = rotations.matrix_from_quaternion(frame.orientation)
         if frame.link < 0:
             return frame.position.copy(), own
         here = self._work[frame.link]
@@ -171,7 +184,11 @@ class Simulator:
         frame = self.tree.frame(part)
         out = np.zeros((6, self.nv))
         kinematics.point_jacobian(
-            self._links, self._work, frame.link, frame.position + _matrix(frame.orientation) @ point, out
+            self._links,
+            self._work,
+            frame.link,
+            frame.position + rotations.matrix_from_quaternion(frame.orientation) @ point,
+            out,
         )
         return out
 
@@ -201,33 +218,45 @@ class Simulator:
             total -= link["mass"] * (self._parameters[:GRAVITY] @ center)
         return float(total)
 
-    def wrenches(self, q: np.ndarray, v: np.ndarray, vdot: np.ndarray | None = None) -> dict[str, Wrench]:
-        """The wrench ON a part BY each joint and constraint effect, by name, under the scene's own acceleration.
+    def wrench_array(self, q: np.ndarray, v: np.ndarray, vdot: np.ndarray | None = None) -> np.ndarray:
+        """(len(wrench_names), 6): force and moment ON a part BY each joint and constraint effect, world axes.
 
-        With vdot given (a motion that was measured, not predicted), the joints' wrenches are what that motion needs, and
-        constraint effects are left out: inverse dynamics cannot tell them from joint forces.
+        About the joint, or the constraint's point. They go with the scene's own acceleration; with vdot given (a motion that
+        was measured, not predicted) they are what that motion needs, and those of constraint effects are zero: inverse
+        dynamics cannot tell them from joint forces.
         """
-        gravity = self._parameters[:GRAVITY]
-        out: dict[str, Wrench] = {}
+        out = np.zeros((len(self.wrench_names), 6))
+        count = len(self._links)
         if vdot is None:
-            self.rank = self._module.evaluate(
-                *self._system, q, v, self._still, 0.0, self._vdot, self._scratch[:3, : self.nv]
-            )
+            self.rank = self._module.evaluate(*self._system, q, v, self._still, 0.0, self._vdot, self._scratch[:3])
             constraint.load_links(self._work, self._pairs)
-            for label, first, last in self._labels:
+            for row, (_, first, last) in enumerate(self._labels, start=count):
                 own = self._pairs[first:last]
-                point = own[0]["b"]
-                moment = np.sum([np.cross(pair["b"] - point, pair["force"]) for pair in own], axis=0)
-                out[label] = Wrench(own["force"].sum(axis=0), moment, point.copy())
+                out[row, :3] = own["force"].sum(axis=0)
+                if last - first > 1:
+                    out[row, 3:] = np.cross(own["b"] - own["b"][0], own["force"]).sum(axis=0)
         else:
             kinematics.move(self._links, self._work, q, v)
-            newton_euler.spread(self._links, self._work, vdot, gravity)
+            newton_euler.spread(self._links, self._work, vdot, self._parameters[:GRAVITY])
         newton_euler.transmit(self._links, self._work)
-        for link, here in zip(self.tree.links, self._work, strict=True):
-            out[link.joint.name] = Wrench(
-                here["bias_force"].copy(), here["bias_moment"].copy(), here["origin"].copy()
-            )
+        out[:count, :3] = self._work["bias_force"]
+        out[:count, 3:] = self._work["bias_moment"]
         return out
+
+    def wrenches(self, q: np.ndarray, v: np.ndarray, vdot: np.ndarray | None = None) -> dict[str, Wrench]:
+        """``wrench_array`` by name, each with its point."""
+        array = self.wrench_array(q, v, vdot)
+        constraint.place(self._work, self._pairs)
+        points = [*self._work["origin"], *(self._pairs["b"][first] for _, first, _ in self._labels)]
+        return {
+            name: Wrench(row[:3], row[3:], np.array(point))
+            for name, row, point in zip(self.wrench_names, array, points, strict=True)
+        }
+
+    @property
+    def effort(self) -> np.ndarray:
+        """(nv,) generalized forces of the effects at the last ``acceleration`` or ``wrenches``."""
+        return self._scratch[2].copy()
 
     def _check_inertia(self) -> None:
         """Refuse joints that move no inertia, in any of a few postures (a point mass on a joint's axis, say)."""
@@ -248,9 +277,3 @@ class Simulator:
             raise ModelError(
                 f"'{self.tree.freedom_names[worst]}' moves no inertia: give what it carries a mass off its axis or an inertia"
             )
-
-
-def _matrix(q: np.ndarray) -> np.ndarray:
-    from physics_prior import rotations
-
-    return rotations.matrix_from_quaternion(q)

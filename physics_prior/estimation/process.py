@@ -1,0 +1,112 @@
+"""Process models: how the state goes on between measurements, and how surely.
+
+``PhysicsProcess`` is the scene's own step, its noise an unknown force. ``KinematicProcess`` knows no physics but that
+acceleration changes slowly (constant acceleration, white jerk: Bar-Shalom 2001, ch. 6.2.3); it is what physics is
+measured against.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from physics_prior.dynamics.simulator import Simulator
+from physics_prior.scene import Scene
+
+
+@dataclass(eq=False)
+class State:
+    """A state on the manifold: q (nq,), v (nv,) and, for the kinematic process, the acceleration (nv,), else empty."""
+
+    q: np.ndarray
+    v: np.ndarray
+    acceleration: np.ndarray
+
+    def copy(self) -> "State":
+        return State(self.q.copy(), self.v.copy(), self.acceleration.copy())
+
+
+class Process(Protocol):
+    """A process model: n errors (tangent of q, v, what else it keeps)."""
+
+    n: int
+
+    def start(self, q: np.ndarray, v: np.ndarray) -> State:
+        """A state from configuration and velocity."""
+
+    def start_factor(self) -> np.ndarray:
+        """(n - 2 nv,) standard deviations of what else it keeps, before the first measurement."""
+
+    def advance(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
+        """Move the state in place by h seconds; return its derivative F (n, n) and a noise factor G (n, g)."""
+
+    def displace(self, state: State, error: np.ndarray) -> State:
+        """The state moved by an error (n,)."""
+
+    def difference(self, start: State, end: State) -> np.ndarray:
+        """The error (n,) that leads from one state to another."""
+
+
+def steps(seconds: float, size: float) -> tuple[int, float]:
+    """How many equal steps of at most ``size`` fill a time, and how long each is."""
+    count = max(1, math.ceil(seconds / size - 1e-9))
+    return count, seconds / count
+
+
+class _OnManifold:
+    def __init__(self, scene: Scene, simulator: Simulator, n: int) -> None:
+        self.scene, self.simulator, self.n = scene, simulator, n
+
+    def displace(self, state: State, error: np.ndarray) -> State:
+        nv = self.simulator.nv
+        q = self.simulator.displaced(state.q, error[:nv])
+        return State(q, state.v + error[nv : 2 * nv], state.acceleration + error[2 * nv :])
+
+    def difference(self, start: State, end: State) -> np.ndarray:
+        turn = self.simulator.tree.difference(start.q, end.q)
+        return np.concatenate([turn, end.v - start.v, end.acceleration - start.acceleration])
+
+
+class PhysicsProcess(_OnManifold):
+    """The scene's own step, with its analytic derivatives; noise is an unknown generalized force."""
+
+    def __init__(self, scene: Scene, simulator: Simulator) -> None:
+        super().__init__(scene, simulator, 2 * simulator.nv)
+
+    def start(self, q: np.ndarray, v: np.ndarray) -> State:
+        return State(q, v, np.zeros(0))
+
+    def start_factor(self) -> np.ndarray:
+        return np.zeros(0)
+
+    def advance(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
+        return self.simulator.linearise(state.q, state.v, h, self.scene.noise.force)
+
+
+class KinematicProcess(_OnManifold):
+    """Constant acceleration of every degree of freedom, driven by white jerk; knows neither mass nor constraint."""
+
+    def __init__(self, scene: Scene, simulator: Simulator) -> None:
+        super().__init__(scene, simulator, 3 * simulator.nv)
+
+    def start(self, q: np.ndarray, v: np.ndarray) -> State:
+        return State(q, v, np.zeros(len(v)))
+
+    def start_factor(self) -> np.ndarray:
+        return 10.0 * self.scene.noise.velocity
+
+    def advance(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
+        nv = self.simulator.nv
+        state.q[:] = self.simulator.displaced(state.q, h * state.v + 0.5 * h * h * state.acceleration)
+        state.v += h * state.acceleration
+        F = np.eye(3 * nv)
+        index = np.arange(nv)
+        F[index, nv + index] = F[nv + index, 2 * nv + index] = h
+        F[index, 2 * nv + index] = 0.5 * h * h
+        moments = np.array([[h**5 / 20, h**4 / 8, h**3 / 6], [h**4 / 8, h**3 / 3, h**2 / 2], [h**3 / 6, h**2 / 2, h]])
+        return F, np.kron(np.linalg.cholesky(moments), np.diag(self.scene.noise.jerk))
+
+
+PROCESSES = {"physics": PhysicsProcess, "kinematic": KinematicProcess}
+"""The process models, by the name that ``--process`` knows them by."""

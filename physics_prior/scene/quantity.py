@@ -43,7 +43,7 @@ def parse_quantity(value: Any, *units: str) -> float:
         return float(value)
     match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
     if match is None:
-        raise ValueError(f"{str(value)[:80]!r} is not a number: give one {wanted}")
+        raise ValueError(f"{value!r:.80} is not a number: give one {wanted}")
     number, unit = float(match[1]), match[2]
     scale = 1.0
     if unit:

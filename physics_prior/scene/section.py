@@ -111,6 +111,9 @@ def _scene_error(error: ValidationError, model: type[BaseModel], place: Place) -
     location, kind, context = first["loc"], first["type"], first.get("ctx", {})
     if location and location[-1] == "[key]":  # pydantic's way to say that a key itself is wrong
         location = location[:-1]
+    shorthand = model.shorthand if issubclass(model, Section) else None
+    if location[:1] == (shorthand,) and place.value is not None and not place.is_mapping:
+        location = location[1:]  # the value stands where the section would
     if kind == "unknown_key":
         return place.inside(location).error(context["message"], context["key"])
     if kind == "extra_forbidden":

@@ -159,6 +159,7 @@ SLIPS = {
     ),
     "inertia: 0.01": ("shape: {sphere: 1}", "model.parts.ball: 'inertia' is missing"),
     "{sphere: 0.1 m}": ("{spere: 0.1 m}", "model.parts.arm.shape: 'spere' is not a shape (did you mean 'sphere'?)"),
+    "shape: {sphere: 0.1 m}": ("shape: {box: [1, -1, 1]}", "model.parts.arm.shape.box[1]: -1 is out of range"),
     "radius: 2 cm": ("radius: 0 cm", "model.parts.arm.inertia.cylinder.radius: '0 cm' is out of range"),
     "[[2, 0.1, 0]": ("[[2, 0.2, 0]", "model.parts.cart.inertia: inertia [[2.0, 0.2, 0.0]"),
     "[0, 0, 3]]": ("[0, 0, 9]]", "model.parts.cart.inertia: inertia with principal moments"),
@@ -198,7 +199,6 @@ SLIPS = {
     "0.99}": ("1}", "gate.probability: 1 is out of range: give a number < 1"),
     "lost_after: 1 s": ("lost_after: 1 ms", "health: lost_after 0.001 s is too short"),
     "rail: 10 cm": ("rail: 10 deg", "initial.positions.rail: '10 deg' is not a quantity in m"),
-    "180 deg/s]": ("1]", None),
     "[0, 0, 180 deg/s]": ("[0, 0]", "initial.velocities.shoulder: [0, 0] is not an angular velocity"),
     "angular: [1, 2, 3]": (
         "angle: [1, 2, 3]",
@@ -214,9 +214,6 @@ def test_slips_are_refused_by_line_and_field(write, old):
     new, message = SLIPS[old]
     assert old in EVERYTHING
     path = write(EVERYTHING.replace(old, new, 1))
-    if message is None:
-        load_scene(path)
-        return
     with pytest.raises(SceneError) as error:
         load_scene(path)
     said = str(error.value)

@@ -1,0 +1,206 @@
+"""The estimator: measurements in, estimates out. The one core behind both doors, the node and the replay."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from physics_prior.dynamics.simulator import Simulator
+from physics_prior.errors import MeasurementError, SimulationError
+from physics_prior.estimation.estimate import Counts, Estimate, Health, Level
+from physics_prior.estimation.filter import Filter, Posterior
+from physics_prior.estimation.history import START_WINDOW, History, Node
+from physics_prior.estimation.measurement import Measurement
+from physics_prior.estimation.process import PROCESSES
+from physics_prior.estimation.start import start
+from physics_prior.scene import Scene
+
+JUMP_AFTER = 5  # measurements in a row that are too old or doubled: time has jumped back (a looped bag)
+STREAK = 3  # refused measurements in a row that degrade health
+DIFFERENCE = 1e-3  # of a standard deviation: the step of the forces' directional derivatives
+
+
+class Estimator:
+    """Estimates the state of a scene from measurements in any order.
+
+    Nothing that a measurement brings makes it raise; what is odd is counted and explained by ``last_rejection``.
+
+    Attributes:
+        scene, simulator, filter: what it works with.
+        history: what it remembers.
+        last_rejection: why the last rejected measurement was.
+    """
+
+    def __init__(self, scene: Scene, process: str = "physics", history_length: float = 1.0) -> None:
+        self.scene = scene
+        self.simulator = Simulator(scene.tree, scene.effects, scene.step.integrator)
+        self.filter = Filter(scene, self.simulator, PROCESSES[process](scene, self.simulator))
+        self.history = History(self.filter, round(history_length * 1e9))
+        self.last_rejection = ""
+        self._read = self._late = self._rejected = 0
+        self._dropped = Counts()
+        self._waiting: list[Measurement] = []
+        self._stale: list[Measurement] = []
+
+    @property
+    def ready(self) -> bool:
+        """Whether there is an estimate."""
+        return bool(self.history)
+
+    @property
+    def stamp(self) -> int:
+        """Stamp of the newest measurement in the estimate, ns; 0 before the start."""
+        return self.history.nodes[-1].measurement.stamp if self.history else 0
+
+    @property
+    def counts(self) -> Counts:
+        """What became of the measurements so far."""
+        used = sum(node.posterior.used is True for node in self.history.nodes)
+        gated = sum(node.posterior.used is False for node in self.history.nodes)
+        return Counts(self._read, self._dropped.used + used, self._dropped.gated + gated, self._late, self._rejected)
+
+    def reset(self) -> None:
+        """Forget all measurements; the next ones start it cold."""
+        self.history = History(self.filter, self.history.length)
+        self._waiting, self._stale = [], []
+
+    def reject(self, why: str) -> None:
+        """Count a message that could not be made a measurement, and say why."""
+        self._read += 1
+        self._rejected += 1
+        self.last_rejection = why
+
+    def add(self, measurement: Measurement) -> bool:
+        """Take in a measurement; return whether the newest estimate changed."""
+        self._read += 1
+        if not self.history:
+            return self._begin(measurement)
+        if self.history.holds(measurement) or not self.history.reaches(measurement.stamp):
+            return self._set_aside(measurement)
+        self._stale.clear()
+        try:
+            self._late += self.history.insert(measurement)
+        except SimulationError as problem:
+            self.last_rejection = str(problem)
+            self.reset()
+            return False
+        for node in self.history.trim():
+            self._settle(node)
+        return True
+
+    def estimate(self, stamp: int | None = None) -> Estimate:
+        """The newest estimate, or what it predicts for a later stamp, ns.
+
+        Raises:
+            MeasurementError: not started yet; SimulationError: the prediction left the numbers.
+        """
+        if not self.history:
+            raise MeasurementError("there is no estimate yet: measurements have not fixed the configuration")
+        newest = self.history.nodes[-1].posterior
+        posterior = newest if stamp is None else self.filter.predict(newest, stamp)
+        return replace(self.describe(posterior), counts=self.counts)
+
+    def health_at(self, stamp: int) -> Health:
+        """Health of the estimate at a stamp, ns."""
+        if not self.history:
+            return Health(Level.LOST, "waiting for measurements that fix the configuration")
+        return self._health(self.history.nodes[-1].posterior, stamp)
+
+    def describe(self, posterior: Posterior) -> Estimate:
+        """The estimate that a posterior stands for: forces and their uncertainty, and its health."""
+        simulator, nv, state = self.simulator, self.simulator.nv, posterior.state
+        by_physics = len(state.acceleration) == 0
+        wrenches = simulator.wrenches(state.q, state.v, None if by_physics else state.acceleration)
+        effort = simulator.effort if by_physics else np.zeros(nv)
+        vdot = simulator.acceleration(state.q, state.v) if by_physics else state.acceleration
+        rank = simulator.rank
+        deviations = self._wrench_deviations(posterior)
+        error = simulator.constraint_error(state.q, state.v)
+        covariance = posterior.factor @ posterior.factor.T
+        return Estimate(
+            stamp=posterior.stamp,
+            q=state.q.copy(),
+            v=state.v.copy(),
+            covariance=covariance[: 2 * nv, : 2 * nv],
+            vdot=vdot.copy(),
+            effort=effort,
+            wrenches=wrenches,
+            wrench_deviations=dict(zip(simulator.wrench_names, deviations, strict=True)),
+            constraint_error=float(np.max(np.abs(error))) if len(error) else 0.0,
+            rank=rank,
+            health=self._health(posterior, posterior.stamp),
+            nis=(posterior.nis, posterior.dimension),
+        )
+
+    def _wrench_deviations(self, posterior: Posterior) -> np.ndarray:
+        """(wrenches, 6) standard deviations: P_w = (dw/dx) P (dw/dx)^T, by differences along the columns of P's factor.
+
+        Of the forces that go with the state; the white force noise itself has none that a moment's value could have.
+        """
+        process, simulator = self.filter.process, self.simulator
+        total = np.zeros((len(simulator.wrench_names), 6))
+        for column in posterior.factor.T:
+            if not column.any():
+                continue
+            pair = []
+            for sign in (DIFFERENCE, -DIFFERENCE):
+                state = process.displace(posterior.state, sign * column)
+                vdot = state.acceleration if len(state.acceleration) else None
+                pair.append(simulator.wrench_array(state.q, state.v, vdot))
+            total += ((pair[0] - pair[1]) / (2.0 * DIFFERENCE)) ** 2
+        return np.sqrt(total)
+
+    def _health(self, posterior: Posterior, stamp: int) -> Health:
+        age = (stamp - posterior.accepted) * 1e-9
+        if age > self.scene.health.lost_after:
+            return Health(Level.LOST, f"no measurement was accepted for {age:.1f} s")
+        if age > self.scene.health.degraded_after:
+            return Health(Level.DEGRADED, f"no measurement was accepted for {age:.2f} s: the state is predicted")
+        if posterior.refused >= STREAK:
+            return Health(Level.DEGRADED, f"the gate refused the last {posterior.refused} measurements")
+        return Health(Level.OK)
+
+    def _begin(self, measurement: Measurement) -> bool:
+        """Try to start from what has come so far, as soon as a newer stamp tells that one stamp is complete."""
+        newest = max((each.stamp for each in self._waiting), default=measurement.stamp)
+        if measurement.stamp < newest - START_WINDOW:
+            return self._set_aside(measurement)
+        started = False
+        if measurement.stamp > newest:
+            started = self._start(newest)
+        if started:
+            self._read -= 1  # it is read again
+            return self.add(measurement)
+        self._waiting = [each for each in self._waiting if each.stamp > measurement.stamp - START_WINDOW]
+        self._waiting.append(measurement)
+        return False
+
+    def _start(self, stamp: int) -> bool:
+        """Start from the waiting measurements at a stamp, or from the newest of every topic about it."""
+        together = [each for each in self._waiting if each.stamp == stamp]
+        newest = {each.topic: each for each in sorted(self._waiting, key=lambda each: each.stamp)}
+        for chosen in (together, list(newest.values())):
+            posterior = start(self.filter, chosen, stamp)
+            if posterior is not None:
+                self.history.begin([each for each in chosen if each.stamp == stamp], posterior)
+                self._waiting = []
+                return True
+        return False
+
+    def _set_aside(self, measurement: Measurement) -> bool:
+        """Keep a measurement that finds no place; enough of them in a row mean that time has jumped back."""
+        self._stale.append(measurement)
+        if len(self._stale) >= JUMP_AFTER:
+            again = self._stale
+            self.reset()
+            self._read -= len(again)
+            self._rejected -= len(again) - 1
+            self.last_rejection = "time jumped back: the estimate was started anew"
+            return any([self.add(each) for each in again])
+        self._rejected += 1
+        self.last_rejection = f"topic '{measurement.topic}': a measurement was doubled or older than the history"
+        return False
+
+    def _settle(self, node: Node) -> None:
+        """Count a node that leaves the history for good."""
+        self._dropped.used += node.posterior.used is True
+        self._dropped.gated += node.posterior.used is False

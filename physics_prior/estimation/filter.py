@@ -1,0 +1,126 @@
+"""The square-root error-state filter on the manifold: predict, gate, update.
+
+It is a function from a posterior and a measurement to a posterior, with no memory of its own: the history re-rolls it at
+will, and the same measurements give the same numbers in whatever order they came.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from physics_prior.dynamics.simulator import Simulator
+from physics_prior.errors import MeasurementError
+from physics_prior.estimation.measurement import Measurement
+from physics_prior.estimation.observation import Innovation, innovation
+from physics_prior.estimation.process import Process, State, steps
+from physics_prior.estimation.square_root import innovate, predict_factor
+from physics_prior.scene import MeasurementSource, Scene
+
+ITERATIONS = 5  # of the update, where one linearisation does not do
+SMALL_CORRECTION = 0.02  # rad or m: below it, one does
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """What is known at a stamp after a measurement.
+
+    Attributes:
+        stamp: ns.
+        state: the best state.
+        factor: (n, n) lower factor S of its covariance S S^T.
+        accepted: stamp of the last measurement that was believed, ns.
+        refused: how many the gate has refused since.
+        used: whether the last one was believed; None where it said nothing or did not fit.
+        nis: its normalised innovation squared; dimension: what that is expected to be.
+        start: whether it is a (re)start from measurements alone.
+    """
+
+    stamp: int
+    state: State
+    factor: np.ndarray
+    accepted: int
+    refused: int = 0
+    used: bool | None = None
+    nis: float = 0.0
+    dimension: int = 0
+    start: bool = False
+
+
+class Filter:
+    """Predicts and updates posteriors by a scene's process and sources.
+
+    Attributes:
+        simulator, process: the compiled model and the process model on it.
+        sources: topic -> source.
+    """
+
+    def __init__(self, scene: Scene, simulator: Simulator, process: Process) -> None:
+        self.scene, self.simulator, self.process = scene, simulator, process
+        self.sources: dict[str, MeasurementSource] = {source.topic: source for source in scene.measurements}
+        self.order = {topic: index for index, topic in enumerate(self.sources)}
+        self._limits: dict[int, float] = {}
+
+    def predict(self, posterior: Posterior, stamp: int) -> Posterior:
+        """The posterior carried to a later stamp, ns."""
+        if stamp <= posterior.stamp:
+            return posterior
+        count, h = steps((stamp - posterior.stamp) * 1e-9, self.scene.step.size)
+        state, factor = posterior.state.copy(), posterior.factor.copy()
+        W: np.ndarray | None = None
+        for _ in range(count):
+            F, G = self.process.advance(state, h)
+            if W is None:
+                W = np.empty((len(factor), len(factor) + G.shape[1]))
+            predict_factor(F, factor, G, W)
+        return replace(posterior, stamp=stamp, state=state, factor=factor, used=None, nis=0.0, dimension=0, start=False)
+
+    def innovation(self, measurement: Measurement, state: State) -> Innovation:
+        """The measurement against a state; MeasurementError if it does not fit its source."""
+        self.simulator.move(state.q, state.v)
+        return innovation(self.sources[measurement.topic], measurement, self.simulator, state.q)
+
+    def gate_limit(self, dimension: int) -> float:
+        """The normalised innovation squared that a measurement of this dimension may have."""
+        if dimension not in self._limits:
+            self._limits[dimension] = float(chi2.ppf(self.scene.gate.probability, dimension))
+        return self._limits[dimension]
+
+    def update(self, prior: Posterior, measurement: Measurement, gated: bool = True) -> Posterior:
+        """The prior at the measurement's stamp, updated by it, if the gate lets it pass.
+
+        Iterated (Gauss-Newton, Bell and Cathey 1993) where the correction is too large for one linearisation.
+        """
+        try:
+            seen = self.innovation(measurement, prior.state)
+        except MeasurementError:
+            return prior
+        m, n = len(seen.y), len(prior.factor)
+        if m == 0:
+            return prior
+        W, whitened = np.empty((m + n, m + n)), np.empty(m)
+        nis = innovate(prior.factor, seen.H, seen.noise, W, whitened, seen.y)
+        if gated and not nis <= self.gate_limit(m):
+            return replace(prior, refused=prior.refused + 1, used=False, nis=nis, dimension=m)
+        correction = W[m:, :m] @ whitened
+        state = self.process.displace(prior.state, correction)
+        for _ in range(ITERATIONS - 1):
+            if np.max(np.abs(correction[: self.simulator.nv])) < SMALL_CORRECTION:
+                break
+            seen = self.innovation(measurement, state)
+            from_prior = self.process.difference(prior.state, state)
+            innovate(prior.factor, seen.H, seen.noise, W, whitened, seen.y + seen.H @ from_prior[: seen.H.shape[1]])
+            change = W[m:, :m] @ whitened - from_prior
+            state = self.process.displace(prior.state, from_prior + change)
+            if np.max(np.abs(change)) < 1e-3 * SMALL_CORRECTION:
+                break
+        factor = np.ascontiguousarray(W[m:, m:])
+        self.constrain(state, factor)
+        return replace(
+            prior, state=state, factor=factor, accepted=prior.stamp, refused=0, used=True, nis=nis, dimension=m
+        )
+
+    def constrain(self, state: State, factor: np.ndarray) -> None:
+        """Put state and covariance onto the constraints, where the process knows them."""
+        if self.simulator.rows and self.process.n == 2 * self.simulator.nv:
+            self.simulator.constrain(state.q, state.v, factor)

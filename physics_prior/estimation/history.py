@@ -1,0 +1,100 @@
+"""The history: measurements in order of their stamps, each with the posterior after it.
+
+A late measurement is put in its place and everything after it is rolled again, so that what is known in the end depends on
+what was measured and not on when it arrived (the ordered map of past updates that Pronto keeps).
+"""
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from physics_prior.estimation.filter import Filter, Posterior
+from physics_prior.estimation.measurement import Measurement
+from physics_prior.estimation.start import start
+
+START_WINDOW = 100_000_000  # ns: measurements of other topics this much older may help to start
+
+
+@dataclass
+class Node:
+    """A measurement and what was known just before and after it."""
+
+    measurement: Measurement
+    prior: Posterior
+    posterior: Posterior
+
+
+class History:
+    """Ordered nodes over a span of time.
+
+    Attributes:
+        nodes: oldest first; those older than ``length`` ns before the newest are dropped.
+    """
+
+    def __init__(self, filter: Filter, length: int) -> None:
+        self.filter, self.length = filter, length
+        self.nodes: list[Node] = []
+        self._keys: list[tuple[int, int]] = []
+
+    def __bool__(self) -> bool:
+        return bool(self.nodes)
+
+    def begin(self, measurements: Iterable[Measurement], posterior: Posterior) -> None:
+        """Start anew from a posterior that was made of these measurements."""
+        self.nodes = [Node(each, posterior, posterior) for each in sorted(measurements, key=self._key)]
+        self._keys = [self._key(node.measurement) for node in self.nodes]
+
+    def holds(self, measurement: Measurement) -> bool:
+        """Whether a measurement of this stamp and topic is there already."""
+        place = bisect_left(self._keys, self._key(measurement))
+        return place < len(self._keys) and self._keys[place] == self._key(measurement)
+
+    def reaches(self, stamp: int) -> bool:
+        """Whether a measurement at this stamp still finds its place."""
+        return bool(self._keys) and stamp >= self._keys[0][0]
+
+    def insert(self, measurement: Measurement) -> bool:
+        """Put a measurement in its place and roll on from there; return whether it was late."""
+        key = self._key(measurement)
+        place = bisect_right(self._keys, key)
+        late = place < len(self._keys)
+        before = self.nodes[place - 1].posterior
+        self._keys.insert(place, key)
+        self.nodes.insert(place, Node(measurement, before, before))
+        for index in range(place, len(self.nodes)):
+            self._roll(index)
+        return late
+
+    def trim(self) -> list[Node]:
+        """Drop and return the nodes that are older than the history's length."""
+        oldest = self._keys[-1][0] - self.length
+        count = 0
+        while self._keys[count][0] < oldest:
+            count += 1
+        dropped = self.nodes[:count]
+        del self.nodes[:count], self._keys[:count]
+        return dropped
+
+    def _key(self, measurement: Measurement) -> tuple[int, int]:
+        return measurement.stamp, self.filter.order[measurement.topic]
+
+    def _roll(self, index: int) -> None:
+        """Predict and update one node from the one before it; start anew where the gate refused too many in a row."""
+        node = self.nodes[index]
+        node.prior = self.filter.predict(self.nodes[index - 1].posterior, node.measurement.stamp)
+        node.posterior = self.filter.update(node.prior, node.measurement)
+        if node.posterior.refused >= self.filter.scene.gate.recover_after:
+            restarted = self._restart(index)
+            if restarted is not None:
+                node.posterior = restarted
+
+    def _restart(self, index: int) -> Posterior | None:
+        """A start from the measurements about this node: the gate says the estimate is wrong, so they are believed."""
+        stamp = self.nodes[index].measurement.stamp
+        newest: dict[str, Measurement] = {}
+        for node in reversed(self.nodes[: index + 1]):
+            if stamp - node.measurement.stamp > START_WINDOW:
+                break
+            newest.setdefault(node.measurement.topic, node.measurement)
+        together = [each for each in newest.values() if each.stamp == stamp]
+        return start(self.filter, together, stamp) or start(self.filter, list(newest.values()), stamp)

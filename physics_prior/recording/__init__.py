@@ -1,6 +1,7 @@
 """Recordings without ROS: messages, their CDR bytes, and MCAP bags as rosbag2 writes them.
 
-`open_bag` reads, `BagWriter` writes, `encode` and `decode` turn messages into the bytes that ROS sends and back.
+`open_bag` reads, `BagWriter` writes; `encode` and `decode` turn messages into the bytes that ROS sends and
+back.
 """
 
 from physics_prior.recording.cdr import decode, encode

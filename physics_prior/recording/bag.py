@@ -1,9 +1,9 @@
-"""The rosbag2 folder: NAME/ with NAME_0.mcap, ... and metadata.yaml (version 9, ROS 2 Jazzy), read and described."""
+"""The rosbag2 folder (ROS 2 Jazzy): NAME/ with NAME_0.mcap, ... and metadata.yaml, read and described."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import yaml
 
@@ -16,7 +16,8 @@ NEVER_NS = 2**63 - 1  # what rosbag2 files as the start of a bag without message
 NANOSECONDS = 10**9
 
 
-class Topic(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Topic:
     """A recorded topic: ROS message type (``pkg/msg/Type``), number of messages, encoding of their data."""
 
     type: str
@@ -33,7 +34,7 @@ class BagFiles:
 
 
 def find_files(path: Path) -> BagFiles:
-    """Return the MCAP files of a bag folder or of a bare .mcap. Raises RecordingError naming what is wrong."""
+    """Return the MCAP files of a bag folder or of a bare .mcap. RecordingError names what is wrong."""
     if path.is_file():
         return BagFiles((path,))
     if not path.is_dir():
@@ -45,7 +46,8 @@ def find_files(path: Path) -> BagFiles:
     found = sorted(path.glob("*.mcap"), key=lambda file: (len(file.name), file.name))
     if not found:
         raise RecordingError(f"{path} is not a bag: it holds neither {METADATA_FILE} nor an .mcap file")
-    return BagFiles(tuple(found), f"{path} has no {METADATA_FILE}: its recorder was killed, its .mcap files are read")
+    loss = f"{path} has no {METADATA_FILE}, its recorder was killed: its .mcap files are read"
+    return BagFiles(tuple(found), loss)
 
 
 def _read_metadata(file: Path) -> dict[str, Any]:
@@ -53,13 +55,13 @@ def _read_metadata(file: Path) -> dict[str, Any]:
         with file.open("rb") as stream:
             text = stream.read(MAXIMUM_METADATA_BYTES + 1)
         if len(text) > MAXIMUM_METADATA_BYTES:
-            raise RecordingError(f"{file} is larger than {MAXIMUM_METADATA_BYTES} bytes: it is not a bag's description")
+            raise RecordingError(f"{file} of {MAXIMUM_METADATA_BYTES} bytes or more describes no bag")
         information = yaml.safe_load(text)["rosbag2_bagfile_information"]
     except OSError as error:
         raise RecordingError(f"{file} cannot be read: {error.strerror}") from error
     except (yaml.YAMLError, KeyError, TypeError, ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
-        raise RecordingError(f"{file} does not describe a bag (rosbag2_bagfile_information): {reason}") from error
+        raise RecordingError(f"{file} does not describe a bag: {reason}") from error
     if not isinstance(information, dict):
         raise RecordingError(f"{file} does not describe a bag: rosbag2_bagfile_information must be a mapping")
     return information
@@ -74,15 +76,15 @@ def _listed_files(folder: Path, information: dict[str, Any]) -> tuple[Path, ...]
     mode = information.get("compression_mode") or "none"
     if str(mode).lower() != "none":
         raise RecordingError(
-            f"{folder} has compression_mode {mode}: only bags compressed by chunk, inside the MCAP file, are read;"
+            f"{folder} has compression_mode {mode}: only compression by chunk, inside the MCAP file, is read;"
             " convert it with `ros2 bag convert`"
         )
     names = information.get("relative_file_paths")
     if not isinstance(names, list) or not names:
-        raise RecordingError(f"{folder / METADATA_FILE} must list its files in relative_file_paths, not {names!r}")
+        raise RecordingError(f"{folder / METADATA_FILE} must list relative_file_paths, not {names!r}")
     for name in names:
         if not isinstance(name, str) or Path(name).is_absolute() or ".." in Path(name).parts:
-            raise RecordingError(f"{folder / METADATA_FILE} lists {name!r}, which is not a file inside the bag")
+            raise RecordingError(f"{folder / METADATA_FILE} lists {name!r}, which is not inside the bag")
         if not (folder / name).is_file():
             raise RecordingError(f"{folder} lacks {name}, which its {METADATA_FILE} lists")
     return tuple(folder / name for name in names)
@@ -107,7 +109,10 @@ def offered_qos() -> list[dict[str, Any]]:
 
 
 def describe(
-    file_names: Sequence[str], topics: Mapping[str, Topic], hashes: Mapping[str, str], span_ns: tuple[int, int] | None
+    file_names: Sequence[str],
+    topics: Mapping[str, Topic],
+    hashes: Mapping[str, str],
+    span_ns: tuple[int, int] | None,
 ) -> dict[str, Any]:
     """Return the rosbag2_bagfile_information of a bag of one file; `span_ns` is None without messages."""
     first, last = span_ns or (NEVER_NS, NEVER_NS)
@@ -144,7 +149,7 @@ def describe(
 
 
 class _PlainDumper(yaml.SafeDumper):
-    """Repeats equal parts instead of referring to the first: yaml-cpp readers of rosbag2 expect plain mappings."""
+    """Repeats equal parts instead of referring to the first, as rosbag2 does."""
 
     def ignore_aliases(self, data: Any) -> bool:
         return True

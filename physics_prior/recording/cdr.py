@@ -1,11 +1,13 @@
 """CDR: the bytes of a message, as rmw_fastrtps writes them (OMG DDS-XTypes 1.3, plain XCDR version 1).
 
-Four bytes name the byte order; then come the fields in order, each primitive aligned to its own size counted from
-after those four bytes; strings carry their length with a final NUL, sequences their count, nested messages nothing.
+Four bytes name the byte order; then come the fields in order, each primitive aligned to its own size, counted
+from after those four bytes; strings carry their length with a final NUL, sequences their count, nested
+messages nothing.
 
-A message class is turned once into a plan: a flat list of steps over its leaves, in which neighbouring scalars of
-all nested messages are one `struct` call. Everything read is checked against the bytes that remain before anything
-is allocated. Non-finite numbers pass: a marker that was not seen is NaN, and judging that is not the codec's task.
+A message class is turned once into a plan: a flat list of steps over its leaves, in which neighbouring
+scalars of nested messages are one `struct` call. Everything read is checked against the bytes that remain
+before anything is allocated. Non-finite numbers pass: a marker that was not seen is NaN, and judging that is
+not this module's task.
 """
 
 import struct
@@ -36,22 +38,23 @@ def encode(message: Message) -> bytes:
     Raises RecordingError naming type and field where a value does not fit its field.
     """
     body = bytearray()
-    _plan(type(message)).write(body, message)
+    _plan(message.ros_type).write(body, message)
     return LITTLE_ENDIAN_HEADER + body
 
 
 def decode(type_name: str, data: bytes) -> Message:
     """Return the message of ROS type `type_name` (``pkg/msg/Type``) in CDR bytes of either byte order.
 
-    Bytes after the message are left alone: rmw_fastrtps itself sends some. Raises RecordingError naming type, field
-    and byte offset where the bytes end too early or claim what they cannot hold.
+    Bytes after the message are left alone: rmw_fastrtps itself sends some. Raises RecordingError naming type,
+    field and byte offset where the bytes end too early or claim what they cannot hold.
     """
-    plan = _plan(message_class(type_name))
+    plan = _plan(type_name)
     if len(data) < ENCAPSULATION_BYTES or data[0] != 0 or data[1] > LITTLE:
         raise RecordingError(
             f"{type_name}: CDR data must begin with 00 00 or 00 01 (plain CDR) and two option bytes,"
             f" not with {bytes(data[:ENCAPSULATION_BYTES]).hex(' ') or 'nothing'}"
         )
+    message: Message
     message, _ = plan.read(memoryview(data)[ENCAPSULATION_BYTES:], 0, data[1])
     return message
 
@@ -97,7 +100,9 @@ class _Plan:
             step.write(body, values)
 
 
-_plan = cache(_Plan)
+@cache
+def _plan(type_name: str) -> _Plan:
+    return _Plan(message_class(type_name))
 
 
 def _flatten(cls: type[Message]) -> tuple[list[tuple[str, Field]], Build]:
@@ -142,7 +147,7 @@ def _steps(cls: type[Message], leaves: list[tuple[str, Field]]) -> list[_Step]:
         if not field.is_array:
             steps.append(_String(where, at))
         elif not isinstance(field.element, Primitive):
-            steps.append(_MessageSequence(where, at, _plan(field.element)))
+            steps.append(_MessageSequence(where, at, _plan(field.element.ros_type)))
         elif field.element is STRING:
             steps.append(_StringSequence(where, at))
         elif field.element is UINT8:
@@ -155,7 +160,8 @@ def _steps(cls: type[Message], leaves: list[tuple[str, Field]]) -> list[_Step]:
 
 
 def _least_size(field: Field) -> int:
-    if isinstance(field.element, Primitive) and field.element is not STRING and (field.length or not field.is_array):
+    counted = field.is_array and not field.length
+    if isinstance(field.element, Primitive) and field.element is not STRING and not counted:
         return struct.calcsize("<" + field.element.struct_code) * (field.length or 1)
     return LENGTHS[LITTLE].size
 
@@ -169,8 +175,8 @@ def _read_length(body: memoryview, position: int, order: int, unit: int, where: 
     position += 4
     if count * unit > len(body) - position:
         raise RecordingError(
-            f"{where} at byte {position - 4 + ENCAPSULATION_BYTES}: claims {count} elements of at least {unit} bytes,"
-            f" but only {len(body) - position} bytes follow"
+            f"{where} at byte {position - 4 + ENCAPSULATION_BYTES}: claims {count} elements of {unit} bytes"
+            f" or more, but only {len(body) - position} bytes follow"
         )
     return count, position
 
@@ -182,8 +188,8 @@ def _write_length(body: bytearray, count: int) -> None:
 
 def _too_short(where: str, position: int, size: int) -> RecordingError:
     return RecordingError(
-        f"{where} at byte {position + ENCAPSULATION_BYTES}: the message ends at byte {size + ENCAPSULATION_BYTES},"
-        " before this field does"
+        f"{where} at byte {position + ENCAPSULATION_BYTES}: the message ends before this field,"
+        f" at byte {size + ENCAPSULATION_BYTES}"
     )
 
 
@@ -199,7 +205,8 @@ class _Run:
         self._codes = [code for _, code in scalars]
         self._values = slice(stop - len(scalars), stop)
         self._structs = [
-            [struct.Struct(order + _padded(self._codes, phase)) for phase in range(8)] for order in BYTE_ORDERS
+            [struct.Struct(order + _padded(self._codes, phase)) for phase in range(8)]
+            for order in BYTE_ORDERS
         ]
 
     def read(self, body: memoryview, position: int, order: int, values: list[Any]) -> int:
@@ -233,7 +240,7 @@ def _padded(codes: list[str], phase: int) -> str:
 
 
 class _String:
-    """A text: length with the final NUL, UTF-8, NUL. A length of zero, which some writers send, is the empty text."""
+    """A text: length with the final NUL, UTF-8, NUL. Length zero, which some write, is the empty text."""
 
     def __init__(self, where: str, at: int):
         self._where, self._at = where, at

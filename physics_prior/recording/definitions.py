@@ -1,13 +1,12 @@
 """What the message classes say of themselves: fields, schema text as rosbag2 writes it, and type hash.
 
-All of it is derived from the annotations in `messages`. The hash is that of REP-2011 (RIHS01): SHA-256 of the type
-description as JSON, without default values; it names what goes over the wire and never the comments.
+All of it is derived from the annotations in `messages`. The hash is that of REP-2011 (RIHS01): SHA-256 of the
+type description as JSON, without default values; it covers what goes over the wire, and no comments.
 """
 
 import dataclasses
 import hashlib
 import json
-from functools import cache
 from typing import Annotated, Any, ClassVar, NamedTuple, get_args, get_origin, get_type_hints
 
 from physics_prior.recording import messages as _registered  # noqa: F401  (defining a message registers it)
@@ -18,7 +17,7 @@ NESTED_ID, FIXED_ARRAY_IDS, SEQUENCE_IDS = 1, 48, 144  # offsets of type_descrip
 
 
 class Field(NamedTuple):
-    """One field on the wire: a primitive or a nested message, once, `length` times, or (sequence) any number."""
+    """One field on the wire: a primitive or a nested message; of an array `length`, or any number if None."""
 
     name: str
     element: Primitive | type[Message]
@@ -27,7 +26,6 @@ class Field(NamedTuple):
     default: Any = None
 
 
-@cache
 def fields_of(cls: type[Message]) -> tuple[Field, ...]:
     """Fields of a message class in wire order. An empty message travels as one unused byte, as ROS has it."""
     hints = get_type_hints(cls, include_extras=True)
@@ -53,9 +51,8 @@ def schema_text(cls: type[Message]) -> str:
     Nested types come depth first, by name at each level, each once: rosbag2's order.
     """
     blocks = [_fields_text(cls)]
-    for nested in _dependencies(cls):
-        blocks.append(f"\n{SEPARATOR}\nMSG: {_short_name(nested)}\n{_fields_text(nested)}")
-    return "".join(blocks)
+    blocks += [f"{SEPARATOR}\nMSG: {_short_name(n)}\n{_fields_text(n)}" for n in _dependencies(cls)]
+    return "\n".join(blocks)
 
 
 def _fields_text(cls: type[Message]) -> str:
@@ -97,7 +94,6 @@ def _dependencies(cls: type[Message]) -> list[type[Message]]:
     return list(found)
 
 
-@cache
 def type_hash(cls: type[Message]) -> str:
     """Return the type's RIHS01 hash: what rosbag2 files as `topic_type_hash` and the graph compares."""
     nested = sorted(_dependencies(cls), key=lambda dependency: dependency.ros_type)

@@ -1,8 +1,8 @@
 """One MCAP file as blocks of messages, bounds and checksums checked before anything is believed.
 
-`scan` walks the records at the top level, skipping over the contents of chunks, so that whole, unindexed and cut-off
-files are read the same way and nothing is taken from an index that may be wrong. `Block.load` then reads the
-messages of one chunk. Format: https://mcap.dev/spec.
+`scan` walks the records at the top level, skipping over the contents of chunks, so that whole, unindexed and
+cut-off files are read the same way and nothing is taken from an index that may be wrong. `Block.load` then
+reads the messages of one chunk. Format: https://mcap.dev/spec.
 """
 
 import struct
@@ -16,7 +16,7 @@ from io import SEEK_END, BytesIO
 from pathlib import Path
 from typing import IO
 
-import lz4.frame
+import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
@@ -39,7 +39,7 @@ FIRST_PRIVATE_OPCODE = 0x80
 
 def corrupt(path: Path, offset: int, what: str) -> RecordingError:
     """Return the error for a file that is not what it claims to be, near a byte offset."""
-    return RecordingError(f"{path} is corrupt near byte {offset}: {what}; copy it anew, or try `mcap recover` on it")
+    return RecordingError(f"{path} is corrupt near byte {offset}: {what}; copy it anew or try `mcap recover`")
 
 
 @contextmanager
@@ -49,7 +49,7 @@ def foreign_errors(path: Path, offset: Callable[[], int]) -> Iterator[None]:
         yield
     except OSError as error:
         raise RecordingError(f"{path} cannot be read: {error.strerror or error}") from error
-    except (McapError, zstandard.ZstdError, struct.error, ValueError, KeyError, RuntimeError, MemoryError) as error:
+    except (McapError, zstandard.ZstdError, struct.error, ValueError, RuntimeError, MemoryError) as error:
         raise corrupt(path, offset(), str(error) or type(error).__name__) from error
 
 
@@ -74,7 +74,7 @@ class LoadedBlock:
 
 @dataclass(frozen=True)
 class Block:
-    """Where messages lie: the data of one chunk, or a run of messages outside of chunks (no compression, CRC 0)."""
+    """Where messages lie: the data of one chunk, or a run of messages outside of chunks (CRC 0)."""
 
     path: Path
     offset: int  # of the (compressed) data in the file
@@ -93,7 +93,8 @@ class Block:
             if opcode == Opcode.MESSAGE:
                 _, _, log_time, _ = MESSAGE_HEADER.unpack_from(contents, at)
                 if not self.start_ns <= log_time <= self.end_ns:
-                    raise corrupt(self.path, self.offset, "a message is logged outside of its chunk's time span")
+                    what = "a message is logged outside of its chunk's time span"
+                    raise corrupt(self.path, self.offset, what)
                 log_times.append(log_time)
                 offsets.append(at - RECORD_HEADER.size)
         return LoadedBlock(contents, log_times, offsets)
@@ -133,7 +134,8 @@ def decompress(data: bytes, compression: str, size: int) -> bytes:
             raise ValueError(f"the compressed data claim {claimed} bytes, their chunk {size}")
         return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
     if compression == "lz4":
-        return lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
+        contents: bytes = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
+        return contents
     raise ValueError(f"chunk compression {compression!r} is not known; known are zstd, lz4 and none")
 
 
@@ -151,11 +153,11 @@ class McapFile:
 
 
 def scan(path: Path) -> McapFile:
-    """Walk the records of an MCAP file. Raises RecordingError with offset and hint if it is not one or is corrupt."""
+    """Walk the records of an MCAP file; RecordingError with offset and hint if it is corrupt or none."""
     at = 0
     with foreign_errors(path, lambda: at), path.open("rb") as file:
         if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-            raise RecordingError(f"{path} is not an MCAP file: it does not begin as one; was it renamed or compressed?")
+            raise RecordingError(f"{path} does not begin as an MCAP file does; was it renamed or compressed?")
         size = file.seek(0, SEEK_END)
         file.seek(size - len(MCAP0_MAGIC))
         at = len(MCAP0_MAGIC)
@@ -167,12 +169,11 @@ def scan(path: Path) -> McapFile:
             raise ValueError("no record begins here that would end inside the file")
     found = walker.complete()
     if not walker.footer_seen:
-        lost = (
-            "no message is lost"
-            if walker.data_end_seen
-            else f"kept are the {found.message_counts.total()} messages of the {len(found.blocks)} whole chunks before"
+        kept = f"{found.message_counts.total()} messages of {len(found.blocks)} whole chunks are kept"
+        found.loss = (
+            f"{path} was not closed by its recorder: the {size - at} bytes from byte {at} on are lost,"
+            f" {'but no message' if walker.data_end_seen else kept}"
         )
-        found.loss = f"{path} was not closed by its recorder, {size - at} bytes from byte {at} on are unusable: {lost}"
     return found
 
 
@@ -184,7 +185,8 @@ class _Walker:
         self._found = McapFile(path)
         self._statistics: Statistics | None = None
         self._chunk_count = 0
-        self._bare: tuple[int, int, int, int] | None = None  # begin, end, first and last log time, outside of chunks
+        # Of the messages met outside of chunks since the last chunk: begin, end, first and last log time.
+        self._bare: tuple[int, int, int, int] | None = None
         self.data_end_seen = self.footer_seen = False
 
     def visit(self, at: int) -> int | None:
@@ -270,7 +272,8 @@ class _Walker:
     def _finish_bare_block(self) -> None:
         if self._bare:
             begin, end, first, last = self._bare
-            self._found.blocks.append(Block(self._found.path, begin, end - begin, "", end - begin, 0, first, last))
+            size = end - begin
+            self._found.blocks.append(Block(self._found.path, begin, size, "", size, 0, first, last))
             self._bare = None
 
     def _stream(self, length: int) -> ReadDataStream:

@@ -1,8 +1,8 @@
 """The ROS 2 (Jazzy) messages that this program reads and writes, usable without ROS.
 
-Names, order and units of the fields are those of the ROS interface packages named in each decorator. Quaternions are
-(x, y, z, w) here and nowhere else. Number arrays may be given as any sequence or array; `cdr.decode` returns float64
-arrays. Covariances are 6x6 row-major over (x, y, z, rotation about X, Y, Z).
+Names, order and units of the fields are those of the ROS interface packages named in each decorator.
+Quaternions are (x, y, z, w) here and nowhere else. Number arrays may be given as any sequence or array;
+`cdr.decode` returns float64 arrays. Covariances are 6x6 row-major over (x, y, z, rotation about X, Y, Z).
 """
 
 from collections.abc import Sequence
@@ -218,7 +218,7 @@ class Odometry(Message):
 
 @message("sensor_msgs")
 class JointState(Message):
-    """Joints of one degree of freedom: position [rad, m], velocity [rad/s, m/s], effort [N m, N]; each may be empty."""
+    """Joints of one degree of freedom: position [rad, m], velocity [rad/s, m/s], effort [N m, N]."""
 
     header: Header = field(default_factory=Header)
     name: Sequence[string] = ()

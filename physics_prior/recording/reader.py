@@ -1,12 +1,13 @@
 """Reading a bag in the order in which its messages were logged, within bounded memory.
 
-Blocks (chunks) are loaded only when their time has come: a heap holds the next message of each loaded block, and a
-block is loaded before any message that is not earlier than its first is given out.
+Blocks (chunks) are loaded only when their time has come: a heap holds the next message of each loaded block,
+and a block is loaded before any message that is not earlier than its first is given out.
 """
 
 import heapq
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -58,17 +59,18 @@ class BagReader:
                     f" {type_name} ({channel.message_encoding}); a topic must have one type"
                 )
             count = known.count + file.message_counts[channel.id]
-            self.topics[channel.topic] = known._replace(count=count)
+            self.topics[channel.topic] = replace(known, count=count)
 
     def require_topic(self, name: str, *types: str) -> Topic:
-        """Return a topic that is there, in CDR and, if types are given, of one of them; else RecordingError."""
+        """Return a topic that is there, is CDR and of one of the types, if any; else RecordingError."""
         if name not in self.topics:
             raise RecordingError(f"{self.path} has no topic {name}; it has {', '.join(self.topics)}")
         topic = self.topics[name]
         if topic.encoding != "cdr":
-            raise RecordingError(f"topic {name} of {self.path} is encoded as {topic.encoding!r}; only cdr is read")
+            raise RecordingError(f"topic {name} of {self.path} is encoded as {topic.encoding!r}, not as cdr")
         if types and topic.type not in types:
-            raise RecordingError(f"topic {name} of {self.path} holds {topic.type}; valid is {' or '.join(types)}")
+            valid = " or ".join(types)
+            raise RecordingError(f"topic {name} of {self.path} holds {topic.type}; valid is {valid}")
         return topic
 
     def read(self, topics: Iterable[str] | None = None) -> Iterator[Record]:
@@ -82,23 +84,16 @@ class BagReader:
         return self._records(wanted)
 
     def _records(self, wanted: Iterable[str]) -> Iterator[Record]:
-        # Of each file, what the channels say: topic and type, or None for a channel that is not wanted.
-        channels = {
-            file.path: {
-                channel.id: (channel.topic, self.topics[channel.topic].type) if channel.topic in wanted else None
-                for channel in file.channels.values()
-            }
-            for file in self._files
-        }
+        channels = {file.path: {c.id: c.topic for c in file.channels.values()} for file in self._files}
+        blocks = [block for file in self._files for block in file.blocks]
         seen: Counter[Path] = Counter()
-        for block, log_time, (channel_id, data) in _by_log_time([b for file in self._files for b in file.blocks]):
+        for block, log_time, (channel_id, data) in _by_log_time(blocks):
             seen[block.path] += 1
-            try:
-                channel = channels[block.path][channel_id]
-            except KeyError:
-                raise corrupt(block.path, block.offset, f"a message names unknown channel {channel_id}") from None
-            if channel:
-                yield Record(channel[0], log_time, channel[1], data)
+            topic = channels[block.path].get(channel_id)
+            if topic is None:
+                raise corrupt(block.path, block.offset, f"a message names unknown channel {channel_id}")
+            if topic in wanted:
+                yield Record(topic, log_time, self.topics[topic].type, data)
         for file in self._files:
             if seen[file.path] != file.message_counts.total():
                 written = file.message_counts.total()
@@ -108,14 +103,14 @@ class BagReader:
 def open_bag(path: str | Path) -> BagReader:
     """Open a rosbag2 folder or a bare .mcap file.
 
-    Raises RecordingError, in one sentence, if it is missing, empty, corrupt, of another storage or compressed by
-    message. A bag that its recorder did not close is opened, and `loss` says what is missing.
+    Raises RecordingError, in one sentence, if it is missing, empty, corrupt, of another storage or
+    compressed by message. A bag that its recorder did not close is opened, and `loss` says what is missing.
     """
     return BagReader(Path(path))
 
 
 def _by_log_time(blocks: list[Block]) -> Iterator[tuple[Block, int, tuple[int, bytes]]]:
-    """Merge blocks: (block, log time, (channel id, data)) by log time, then by order of blocks and in the block."""
+    """Merge blocks: (block, log time, (channel id, data)) by log time, then by order of blocks and in each."""
     pending = sorted(range(len(blocks)), key=lambda number: blocks[number].start_ns, reverse=True)
     heads: list[tuple[int, int, int]] = []  # log time, number of the block, index in it
     loaded: dict[int, LoadedBlock] = {}
@@ -126,7 +121,8 @@ def _by_log_time(blocks: list[Block]) -> Iterator[tuple[Block, int, tuple[int, b
             block = blocks[number]
             held_bytes += block.size
             if held_bytes > MAXIMUM_HELD_BYTES:
-                raise corrupt(block.path, block.offset, f"more than {MAXIMUM_HELD_BYTES} bytes of chunks overlap in time")
+                what = f"more than {MAXIMUM_HELD_BYTES} bytes of chunks overlap in time"
+                raise corrupt(block.path, block.offset, what)
             loaded[number] = block.load()
             if loaded[number].log_times:
                 heapq.heappush(heads, (loaded[number].log_times[0], number, 0))

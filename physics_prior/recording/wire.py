@@ -1,6 +1,6 @@
 """How the fields of a message travel: the primitive types of the ROS 2 interface language, as annotations.
 
-A message class states each field once, as an ordinary annotation; schema text, type hash and CDR codec are all
+A message class states each field once, as an ordinary annotation; schema text, type hash and CDR codec are
 derived from it (`definitions`, `cdr`). Lower-case names here are the interface language's own.
 """
 
@@ -16,7 +16,7 @@ from physics_prior.errors import RecordingError
 
 @dataclass(frozen=True, slots=True)
 class Primitive:
-    """A type that is not made of fields: its code in `struct`, its id in ROS type descriptions (FieldType.msg)."""
+    """A type not made of fields: its code in `struct`, its id in ROS type descriptions (FieldType.msg)."""
 
     name: str
     struct_code: str
@@ -64,7 +64,7 @@ def _same(left: Any, right: Any) -> bool:
 
 
 class Message:
-    """Base of every message: an immutable value that knows its ROS type name, e.g. ``sensor_msgs/msg/JointState``."""
+    """Base of every message: an immutable value that knows its ROS type (``sensor_msgs/msg/JointState``)."""
 
     __slots__ = ()
     ros_type: ClassVar[str]
@@ -74,8 +74,6 @@ class Message:
             return NotImplemented
         return all(_same(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))  # type: ignore[arg-type]
 
-    __hash__ = None  # type: ignore[assignment]
-
 
 MESSAGE_CLASSES: dict[str, type[Message]] = {}
 MessageClass = TypeVar("MessageClass", bound=type[Message])
@@ -83,7 +81,7 @@ MessageClass = TypeVar("MessageClass", bound=type[Message])
 
 @dataclass_transform(frozen_default=True, eq_default=False)
 def message(package: str) -> Callable[[MessageClass], MessageClass]:
-    """Make a class a message of ROS package `package`: an immutable dataclass, registered by its type name."""
+    """Make a class a message of a ROS package: an immutable dataclass, registered by its type name."""
 
     def register(cls: MessageClass) -> MessageClass:
         made = dataclass(frozen=True, slots=True, eq=False)(cls)

@@ -3,6 +3,7 @@
 import os
 import secrets
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self
@@ -24,15 +25,20 @@ COMPRESSIONS = {"zstd": CompressionType.ZSTD, "lz4": CompressionType.LZ4, "none"
 class BagWriter:
     """Writes folder `path` with one MCAP file and metadata.yaml; use as a context manager.
 
-    Everything goes to a temporary folder beside `path`, which takes its place when the block ends without an error
-    and is removed when it does not. Checksums cover every byte. The same calls give the same bytes.
+    Everything goes to a temporary folder beside `path`, which takes its place when the block ends without an
+    error and is removed when it does not. Checksums cover every byte. The same calls give the same bytes.
     """
 
     def __init__(
-        self, path: str | Path, *, compression: Literal["zstd", "lz4", "none"] = "zstd", overwrite: bool = False
+        self,
+        path: str | Path,
+        *,
+        compression: Literal["zstd", "lz4", "none"] = "zstd",
+        overwrite: bool = False,
     ):
         if compression not in COMPRESSIONS:
-            raise RecordingError(f"compression {compression!r} is not known; valid are {', '.join(COMPRESSIONS)}")
+            valid = ", ".join(COMPRESSIONS)
+            raise RecordingError(f"compression {compression!r} is not known; valid are {valid}")
         self.path = Path(os.path.abspath(path))
         self._overwrite = overwrite
         self._refuse_what_must_stay()
@@ -85,11 +91,13 @@ class BagWriter:
         """Announce a topic of a message class or ROS type name. Topics without messages are filed too."""
         cls = message_class(message_type) if isinstance(message_type, str) else message_type
         if name in self._topics:
-            if self._topics[name].type != cls.ros_type:
-                raise RecordingError(f"topic {name} is already of type {self._topics[name].type}, not {cls.ros_type}")
+            known = self._topics[name].type
+            if known != cls.ros_type:
+                raise RecordingError(f"topic {name} is already of type {known}, not {cls.ros_type}")
             return
         if cls not in self._schemas:
-            self._schemas[cls] = self._writer.register_schema(cls.ros_type, "ros2msg", schema_text(cls).encode())
+            text = schema_text(cls).encode()
+            self._schemas[cls] = self._writer.register_schema(cls.ros_type, "ros2msg", text)
         self._hashes[name] = type_hash(cls)
         self._channels[name] = self._writer.register_channel(
             name,
@@ -100,17 +108,18 @@ class BagWriter:
         self._topics[name] = Topic(cls.ros_type, 0)
 
     def write(self, topic: str, message: Message | bytes, log_time_ns: int) -> None:
-        """File a message, or its CDR bytes, on an announced topic as logged at a time [ns since the epoch]."""
+        """File a message, or its CDR bytes, on an announced topic, logged at a time [ns since the epoch]."""
         if topic not in self._topics:
-            raise RecordingError(f"topic {topic} was not announced; announced are {', '.join(self._topics) or 'none'}")
+            announced_topics = ", ".join(self._topics) or "none"
+            raise RecordingError(f"topic {topic} was not announced; announced are {announced_topics}")
         announced = self._topics[topic]
         if isinstance(message, Message) and message.ros_type != announced.type:
             raise RecordingError(f"topic {topic} takes {announced.type}, not {message.ros_type}")
         if not 0 <= log_time_ns <= MAXIMUM_TIME_NS:
-            raise RecordingError(f"log time {log_time_ns} ns on topic {topic} must be from 0 to {MAXIMUM_TIME_NS}")
+            raise RecordingError(f"log time {log_time_ns} ns on {topic} is not in [0, {MAXIMUM_TIME_NS}]")
         data = encode(message) if isinstance(message, Message) else message
         self._writer.add_message(self._channels[topic], log_time_ns, data, publish_time=log_time_ns)
-        self._topics[topic] = announced._replace(count=announced.count + 1)
+        self._topics[topic] = replace(announced, count=announced.count + 1)
         first, last = self._span_ns or (log_time_ns, log_time_ns)
         self._span_ns = (min(first, log_time_ns), max(last, log_time_ns))
 
@@ -123,7 +132,8 @@ class BagWriter:
         self._writer.add_metadata("rosbag2", {"serialized_metadata": to_yaml(information)})
         self._writer.finish()
         self._stream.close()
-        (self._partial / METADATA_FILE).write_text(to_yaml({"rosbag2_bagfile_information": information}), "utf-8")
+        described = to_yaml({"rosbag2_bagfile_information": information})
+        (self._partial / METADATA_FILE).write_text(described, "utf-8")
         self._refuse_what_must_stay()
         if os.path.lexists(self.path):
             replaced = self._partial.with_suffix(".replaced")

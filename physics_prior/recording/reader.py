@@ -46,7 +46,8 @@ class BagReader:
         for file in self._files:
             self._add_topics(file)
         if not any(topic.count for topic in self.topics.values()):
-            raise RecordingError(f"{path} holds no messages" + (f": {self.loss}" if self.loss else ""))
+            what = f"nothing is left to read: {self.loss}" if self.loss else f"{path} holds no messages"
+            raise RecordingError(what)
 
     def _add_topics(self, file: McapFile) -> None:
         for channel in sorted(file.channels.values(), key=lambda channel: channel.id):

@@ -1,0 +1,40 @@
+"""Diagnostics out: health with its cause, and the numbers that tell why."""
+
+from collections.abc import Mapping
+
+from physics_prior.dynamics.simulator import Simulator
+from physics_prior.estimation.estimate import Counts, Estimate, Health
+from physics_prior.recording.messages import DiagnosticArray, DiagnosticStatus, Header, KeyValue
+from physics_prior.scene import Scene
+
+
+def diagnostics(
+    header: Header,
+    scene: Scene,
+    simulator: Simulator,
+    health: Health,
+    counts: Counts,
+    estimate: Estimate | None,
+    more: Mapping[str, object],
+) -> DiagnosticArray:
+    """One status; ``estimate`` is None before the first, ``more`` is what its caller alone knows."""
+    values: dict[str, object] = {f"measurements {name}": count for name, count in vars(counts).items()}
+    values["active effects"] = ", ".join(effect.label for effect in scene.effects) or "none"
+    values["constraint rows"] = simulator.rows
+    if estimate is not None:
+        nis, dimension = estimate.nis
+        values |= {
+            "constraint rank": estimate.rank,
+            "constraint error m": f"{estimate.constraint_error:.3g}",
+            "nis": f"{nis:.4g}",
+            "nis expected": dimension,
+        }
+        if estimate.rank < simulator.rows:
+            values["forces"] = "the motion is unique, the split of the constraint forces is not"
+    status = DiagnosticStatus(
+        int(health.level),
+        f"physics_prior: {scene.name}",
+        health.cause or health.level.name,
+        values=[KeyValue(key, str(value)) for key, value in (values | dict(more)).items()],
+    )
+    return DiagnosticArray(header, [status])

@@ -1,0 +1,105 @@
+"""Estimates out: the messages that a scene publishes at each, whoever sends or files them."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from physics_prior.dynamics.simulator import Simulator
+from physics_prior.errors import SimulationError
+from physics_prior.estimation.estimate import Counts, Estimate, Health
+from physics_prior.interface import diagnostics, markers, states
+from physics_prior.interface.geometry import header_of, wrench_of
+from physics_prior.interface.topics import (
+    DIAGNOSTICS,
+    JOINT_DEVIATIONS,
+    JOINT_STATES,
+    MARKERS,
+    MULTI_DOF_JOINT_STATES,
+    ODOMETRY,
+    STATE_COVARIANCE,
+    deviation_topic,
+    force_topics,
+    free_links,
+    scalar_links,
+    topics_of,
+    vector_links,
+)
+from physics_prior.recording.messages import Header, WrenchStamped
+from physics_prior.recording.wire import Message
+from physics_prior.scene import Scene
+
+Publication = tuple[str, Message]
+"""A topic, relative but for /diagnostics, and a message on it."""
+
+
+class Output:
+    """Makes messages of a scene's estimates.
+
+    Attributes:
+        topics: topic -> message type, all that there will ever be.
+    """
+
+    def __init__(self, scene: Scene, simulator: Simulator) -> None:
+        self.topics = topics_of(scene)
+        self._scene, self._simulator = scene, simulator
+        self._scalars, self._vectors = scalar_links(scene.tree), vector_links(scene.tree)
+        self._free = free_links(scene.tree)
+        self._forces = force_topics(scene)
+        self._names = scene.tree.freedom_names
+
+    def states(self, estimate: Estimate) -> list[Publication]:
+        """Joints, odometry, covariance and constraint forces, each force with its standard deviations.
+
+        A force is what acts ON the named part BY the constraint, in the frame of the header, at the estimate's stamp.
+
+        Raises:
+            SimulationError: a number of the estimate is not finite; nothing of it is published then.
+        """
+        _require_finite(estimate)
+        header = self._header(estimate.stamp)
+        out: list[Publication] = []
+        if self._scalars:
+            out.append((JOINT_STATES, states.joint_states(header, self._scalars, estimate)))
+            out.append((JOINT_DEVIATIONS, states.joint_deviations(header, self._scalars, estimate)))
+        if self._vectors:
+            self._simulator.move(estimate.q, estimate.v)
+            joints = states.multi_dof_joint_states(header, self._vectors, estimate, self._simulator)
+            out.append((MULTI_DOF_JOINT_STATES, joints))
+        if self._free:
+            out.append((ODOMETRY, states.odometry(header, self._free[0], estimate)))
+        out.append((STATE_COVARIANCE, states.state_covariance(self._names, estimate)))
+        for name, topic in self._forces.items():
+            wrench, deviation = estimate.wrenches[name], estimate.wrench_deviations[name]
+            out.append((topic, WrenchStamped(header, wrench_of(wrench.force, wrench.moment))))
+            out.append((deviation_topic(topic), WrenchStamped(header, wrench_of(deviation[:3], deviation[3:]))))
+        return out
+
+    def markers(self, estimate: Estimate) -> list[Publication]:
+        """What to draw. Raises SimulationError as ``states`` does."""
+        _require_finite(estimate)
+        header = self._header(estimate.stamp)
+        return [(MARKERS, markers.markers(header, list(self._forces), estimate, self._simulator))]
+
+    def diagnostics(
+        self,
+        stamp: int,
+        health: Health,
+        counts: Counts,
+        estimate: Estimate | None = None,
+        more: Mapping[str, object] = {},
+    ) -> list[Publication]:
+        """Health at a stamp, ns, with its cause and numbers; ``more`` adds named values of the caller's own."""
+        header = self._header(stamp)
+        status = diagnostics.diagnostics(header, self._scene, self._simulator, health, counts, estimate, more)
+        return [(DIAGNOSTICS, status)]
+
+    def _header(self, stamp: int) -> Header:
+        return header_of(stamp, self._scene.frame_id)
+
+
+def _require_finite(estimate: Estimate) -> None:
+    numbers = [estimate.q, estimate.v, estimate.covariance, estimate.vdot, estimate.effort]
+    numbers += [array for wrench in estimate.wrenches.values() for array in (wrench.force, wrench.moment, wrench.point)]
+    numbers += estimate.wrench_deviations.values()
+    if not np.isfinite(np.concatenate(numbers, axis=None)).all():
+        raise SimulationError(f"the estimate at {estimate.stamp} ns is not finite: it is not published")

@@ -1,0 +1,101 @@
+"""States out: joints, the odometry of a free body, and the covariance of everything."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from physics_prior import rotations
+from physics_prior.dynamics.simulator import Simulator
+from physics_prior.estimation.estimate import Estimate
+from physics_prior.interface.geometry import pose_of, quaternion_of, vector_of, wrench_of
+from physics_prior.model import JointKind, Link
+from physics_prior.recording.messages import (
+    Float64MultiArray,
+    Header,
+    JointState,
+    MultiArrayDimension,
+    MultiArrayLayout,
+    MultiDOFJointState,
+    Odometry,
+    PoseWithCovariance,
+    Transform,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+)
+
+
+def joint_states(header: Header, links: Sequence[Link], estimate: Estimate) -> JointState:
+    """Position, velocity and effort (generalized force of the effects) of revolute and prismatic joints."""
+    at, rate = [link.q.start for link in links], [link.v.start for link in links]
+    names = tuple(link.joint.name for link in links)
+    return JointState(header, names, estimate.q[at], estimate.v[rate], estimate.effort[rate])
+
+
+def joint_deviations(header: Header, links: Sequence[Link], estimate: Estimate) -> JointState:
+    """Standard deviations of position and velocity, in the fields of these; a JointState has no place of its own for them."""
+    rate = [link.v.start for link in links]
+    names = tuple(link.joint.name for link in links)
+    return JointState(header, names, estimate.position_deviation[rate], estimate.velocity_deviation[rate])
+
+
+def multi_dof_joint_states(
+    header: Header, links: Sequence[Link], estimate: Estimate, simulator: Simulator
+) -> MultiDOFJointState:
+    """Free and spherical joints; needs ``simulator.move``.
+
+    The transform is the joint's own, its zero to its child. Twist, of the child relative to the parent, and wrench, that of the
+    joint ON the child, are vectors in the frame of the header, the twist's linear part at the child's origin.
+    """
+    transforms, twists, wrenches = [], [], []
+    for link in links:
+        q, v = estimate.q[link.q], estimate.v[link.v]
+        _, R = simulator.pose(link.part)
+        translation, linear = (
+            (vector_of(q[:3]), vector_of(v[:3])) if link.joint.kind is JointKind.FREE else (Vector3(), Vector3())
+        )
+        wrench = estimate.wrenches[link.joint.name]
+        transforms.append(Transform(translation, quaternion_of(q[-4:])))
+        twists.append(Twist(linear, vector_of(R @ v[-3:])))
+        wrenches.append(wrench_of(wrench.force, wrench.moment))
+    names = tuple(link.joint.name for link in links)
+    return MultiDOFJointState(header, names, transforms, twists, wrenches)
+
+
+def odometry(header: Header, link: Link, estimate: Estimate) -> Odometry:
+    """Pose of a free link in the header's frame and its twist in its own, with covariances.
+
+    The error state has the position in world axes and the rotation about the body's own, R -> R exp(d). The message has the
+    pose's rotation about the fixed axes of its frame, R d, and the twist in the body's: u = R^T v changes by
+    R^T dv + u x d.
+    """
+    position, wxyz = estimate.q[link.q][:3], estimate.q[link.q][3:]
+    velocity, omega = estimate.v[link.v][:3], estimate.v[link.v][3:]
+    R = rotations.matrix_from_quaternion(wxyz)
+    seen = R.T @ velocity
+    nv = len(estimate.v)
+    own = np.r_[link.v.start : link.v.stop, nv + link.v.start : nv + link.v.stop]
+    covariance = estimate.covariance[np.ix_(own, own)]
+    to_pose = np.zeros((6, 12))
+    to_pose[:3, :3], to_pose[3:, 3:6] = np.eye(3), R
+    to_twist = np.zeros((6, 12))
+    to_twist[:3, 3:6], to_twist[:3, 6:9], to_twist[3:, 9:] = rotations.skew(seen), R.T, np.eye(3)
+    return Odometry(
+        header,
+        link.part,
+        PoseWithCovariance(pose_of(position, wxyz), _flat(to_pose @ covariance @ to_pose.T)),
+        TwistWithCovariance(Twist(vector_of(seen), vector_of(omega)), _flat(to_twist @ covariance @ to_twist.T)),
+    )
+
+
+def state_covariance(names: Sequence[str], estimate: Estimate) -> Float64MultiArray:
+    """Covariance of the error of all positions, then all velocities; the labels of both dimensions name its rows."""
+    label = ",".join([*names, *(f"{name}/velocity" for name in names)])
+    size = len(estimate.covariance)
+    dimensions = (MultiArrayDimension(label, size, size * size), MultiArrayDimension(label, size, size))
+    return Float64MultiArray(MultiArrayLayout(dimensions), _flat(estimate.covariance))
+
+
+def _flat(matrix: np.ndarray) -> np.ndarray:
+    """Return a matrix row by row, symmetric to the last bit."""
+    return np.ravel(0.5 * (matrix + matrix.T))

@@ -1,0 +1,84 @@
+"""Topics out: what a scene publishes, of which types, under which names. A scene has no topic for what it has not."""
+
+import re
+
+from physics_prior.model import JointKind, Link, Tree
+from physics_prior.recording.messages import (
+    DiagnosticArray,
+    Float64MultiArray,
+    JointState,
+    MarkerArray,
+    MultiDOFJointState,
+    Odometry,
+    WrenchStamped,
+)
+from physics_prior.recording.wire import Message
+from physics_prior.scene import Scene
+from physics_prior.scene.readouts import Subject
+
+JOINT_STATES = "joint_states"
+JOINT_DEVIATIONS = "joint_states/stddev"
+MULTI_DOF_JOINT_STATES = "multi_dof_joint_states"
+ODOMETRY = "odometry"
+STATE_COVARIANCE = "state_covariance"
+CONSTRAINT_FORCES = "constraint_forces"
+MARKERS = "markers"
+DIAGNOSTICS = "/diagnostics"  # absolute, as every tool expects it
+
+LONGEST_NAME = 80  # characters of a force's name in its topic; a whole topic may have 247
+
+
+def topics_of(scene: Scene) -> dict[str, type[Message]]:
+    """Return the topics that a scene publishes, each with its type, in the order of publishing."""
+    topics: dict[str, type[Message]] = {}
+    if scalar_links(scene.tree):
+        topics[JOINT_STATES] = topics[JOINT_DEVIATIONS] = JointState
+    if vector_links(scene.tree):
+        topics[MULTI_DOF_JOINT_STATES] = MultiDOFJointState
+    if free_links(scene.tree):
+        topics[ODOMETRY] = Odometry
+    topics[STATE_COVARIANCE] = Float64MultiArray
+    for topic in force_topics(scene).values():
+        topics[topic] = topics[deviation_topic(topic)] = WrenchStamped
+    topics[MARKERS] = MarkerArray
+    topics[DIAGNOSTICS] = DiagnosticArray
+    return topics
+
+
+def scalar_links(tree: Tree) -> list[Link]:
+    """Return the links on revolute and prismatic joints."""
+    return [link for link in tree.links if link.joint.kind in (JointKind.REVOLUTE, JointKind.PRISMATIC)]
+
+
+def vector_links(tree: Tree) -> list[Link]:
+    """Return the links on free and spherical joints."""
+    return [link for link in tree.links if link.joint.kind in (JointKind.FREE, JointKind.SPHERICAL)]
+
+
+def free_links(tree: Tree) -> list[Link]:
+    """Return the links on free joints."""
+    return [link for link in tree.links if link.joint.kind is JointKind.FREE]
+
+
+def force_topics(scene: Scene) -> dict[str, str]:
+    """Return constraint (a joint or an effect that holds something) -> topic of its force.
+
+    A topic may have fewer characters than a name: the others become '_', and names that become the same are numbered.
+    """
+    topics: dict[str, str] = {}
+    for name in Subject(scene.tree, scene.effects).forces():
+        valid = re.sub(r"[^A-Za-z0-9_]", "_", name)[:LONGEST_NAME]
+        if not valid[:1].isalpha():
+            valid = f"joint_{valid}"
+        same, number = f"{CONSTRAINT_FORCES}/{valid}", 1
+        topic = same
+        while topic in topics.values():
+            number += 1
+            topic = f"{same}_{number}"
+        topics[name] = topic
+    return topics
+
+
+def deviation_topic(topic: str) -> str:
+    """Return the topic of the standard deviations of a force's topic."""
+    return f"{topic}/stddev"

@@ -86,7 +86,7 @@ def test_an_altered_byte_is_refused_or_changes_nothing(recording):
         except RecordingError as error:
             assert str(path) in str(error)  # noqa: PT017
             refused += 1
-    assert refused > 250  # 299 to 300 of 300: a checksum lies over all but the magic at the end
+    assert refused > 250  # 298 to 300: checksums lie over all but the magic at the end
 
 
 def test_random_cuts_out_of_the_middle_are_refused(recording):

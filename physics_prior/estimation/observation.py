@@ -46,7 +46,7 @@ def innovation(source: MeasurementSource, measurement: Measurement, simulator: S
         turn = rotations.log(
             rotations.quaternion_from_matrix(R.T @ rotations.matrix_from_quaternion(measurement.orientation))
         )
-        y = np.concatenate([source.scale * measurement.position - position, turn])
+        y = np.concatenate([measurement.position - position, turn])
         H = np.concatenate([jacobian[3:], R.T @ jacobian[:3]])
         if measurement.covariance is not None:
             return Innovation(y, H, np.linalg.cholesky(measurement.covariance))

@@ -1,0 +1,90 @@
+"""Smoothing of a whole recording: every estimate told by all measurements, those after it too.
+
+Rauch, Tung and Striebel's backward pass in the error state, in square-root form (Sarkka 2013, ch. 8): with the gain
+C = P F^T P_predicted^+, the smoothed covariance is (I - C F) P (I - C F)^T + C (G G^T + P_later) C^T, a sum of squares.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from physics_prior.estimation.filter import Filter, Posterior
+from physics_prior.estimation.history import Node
+from physics_prior.estimation.process import State, steps
+from physics_prior.estimation.square_root import predict_factor, triangularise
+
+NANOSECONDS = 1e9
+INVERTIBLE = 1e-9  # of the largest singular value: smaller ones belong to directions that the constraints forbid
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One step of the prediction: where it began, how it went and where it was to end."""
+
+    stamp: int
+    state: State
+    factor: np.ndarray
+    F: np.ndarray
+    G: np.ndarray
+    predicted: State
+    predicted_factor: np.ndarray
+
+
+def smooth(filter: Filter, nodes: Sequence[Node], period: float) -> list[Posterior]:
+    """Smoothed posteriors, oldest first: one a stamp, and one every ``period`` seconds where nothing was measured.
+
+    nodes: all nodes of a recording in order, as the history rolled them. The chain is cut where the filter started anew.
+    """
+    last: dict[int, Posterior] = {}  # the last posterior at a stamp knows all that was measured then
+    restarts = set()
+    for node in nodes:
+        last[node.measurement.stamp] = node.posterior
+        if node.posterior.start:
+            restarts.add(node.measurement.stamp)
+    stamps = list(last)
+    if not stamps:
+        return []
+    later = last[stamps[-1]]
+    out = [later]
+    for own, after in zip(reversed(stamps[:-1]), reversed(stamps[1:]), strict=True):
+        if after in restarts:
+            later = last[own]
+            out.append(later)
+            continue
+        state, factor = later.state, later.factor
+        for step in reversed(_steps(filter, last[own], after)):
+            state, factor = _back(filter, step, state, factor)
+            later = replace(last[own], stamp=step.stamp, state=state, factor=factor)
+            if step.stamp == own or out[-1].stamp - step.stamp >= period * NANOSECONDS:
+                out.append(later)
+    return out[::-1]
+
+
+def _steps(filter: Filter, posterior: Posterior, stamp: int) -> list[Step]:
+    """The steps by which the filter carried a posterior to a later stamp."""
+    count, h = steps((stamp - posterior.stamp) / NANOSECONDS, filter.scene.step.size)
+    state, factor = posterior.state, posterior.factor
+    out = []
+    for index in range(count):
+        predicted, predicted_factor = state.copy(), factor.copy()
+        F, G = filter.process.advance(predicted, h)
+        predict_factor(F, predicted_factor, G, np.empty((len(F), len(F) + G.shape[1])))
+        began = posterior.stamp + round(index * h * NANOSECONDS)
+        out.append(Step(began, state, factor, F, G, predicted, predicted_factor))
+        state, factor = predicted, predicted_factor
+    return out
+
+
+def _back(filter: Filter, step: Step, state: State, factor: np.ndarray) -> tuple[State, np.ndarray]:
+    """The smoothed state and factor at a step's beginning from those at its end."""
+    scale = np.sqrt(np.maximum(np.sum(step.predicted_factor**2, axis=1), 1e-300))
+    inverse = np.linalg.pinv(step.predicted_factor / scale[:, None], rcond=INVERTIBLE) / scale
+    gain = step.factor @ (step.F @ step.factor).T @ inverse.T @ inverse
+    n = len(gain)
+    W = np.concatenate([(np.eye(n) - gain @ step.F) @ step.factor, gain @ step.G, gain @ factor], axis=1)
+    triangularise(W)
+    smoothed = filter.process.displace(step.state, gain @ filter.process.difference(step.predicted, state))
+    out = np.ascontiguousarray(W[:, :n])
+    filter.constrain(smoothed, out)
+    return smoothed, out

@@ -243,9 +243,7 @@ def accelerate(links, work, tau, gravity, vdot):
                 vdot[n + 1] = acceleration[1] + gravity[1]
                 vdot[n + 2] = acceleration[2] + gravity[2]
                 n += 3
-            total = minus(
-                symmetric_times(get6(here.J_inverse), get3(here.u)), times(get9(here.K), acceleration)
-            )
+            total = minus(symmetric_times(get6(here.J_inverse), get3(here.u)), times(get9(here.K), acceleration))
             local = transposed_times(get9(here.rotation), minus(total, alpha))
             vdot[n], vdot[n + 1], vdot[n + 2] = local
             alpha = total
@@ -317,9 +315,7 @@ def push_generalized(links, work, tau, z):
             force = minus(force, transposed_times(get9(here.K), turn))
             moment = scale(-1.0, torque)
             if link.kind == FREE:
-                rest = symmetric_times(
-                    get6(here.M_inverse), plus((tau[n], tau[n + 1], tau[n + 2]), force)
-                )
+                rest = symmetric_times(get6(here.M_inverse), plus((tau[n], tau[n + 1], tau[n + 2]), force))
                 for c in range(3):
                     z[n + c] = rest[c]
         if link.parent >= 0:
@@ -352,9 +348,7 @@ def pull(links, work, z, vdot):
                 vdot[n], vdot[n + 1], vdot[n + 2] = acceleration
                 n += 3
             total = minus((z[n], z[n + 1], z[n + 2]), times(get9(here.K), acceleration))
-            vdot[n], vdot[n + 1], vdot[n + 2] = transposed_times(
-                get9(here.rotation), minus(total, alpha)
-            )
+            vdot[n], vdot[n + 1], vdot[n + 2] = transposed_times(get9(here.rotation), minus(total, alpha))
             alpha = total
         put3(here.delta_alpha, alpha)
         put3(here.delta_acceleration, acceleration)

@@ -13,7 +13,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
-from physics_prior.dynamics.kernel import cache_directory
+import numpy as np
+
+from physics_prior.dynamics.kernel import cache_directory, inline_kernel
 from physics_prior.effects.effect import Effect
 from physics_prior.model import Tree
 
@@ -22,40 +24,51 @@ INTEGRATORS = (RUNGE_KUTTA, SEMI_IMPLICIT_EULER)
 GRAVITY = 3  # numbers at the head of the parameters
 
 
-def step_source(tree: Tree, effects: Sequence[Effect], constrained: bool, integrator: str) -> str:
+def pack_parameters(tree: Tree, effects: Sequence[Effect]) -> np.ndarray:
+    """The numbers of a scene's step: gravity (3,), where each force effect's own begin (and the end), then they."""
+    gravity = np.sum([np.zeros(GRAVITY), *(effect.field() for effect in effects)], axis=0)
+    numbers = [effect.parameters(tree) for effect in effects if effect.compiled is not None]
+    starts = GRAVITY + len(numbers) + 1 + np.cumsum([0, *(len(own) for own in numbers)])
+    return np.concatenate([gravity, starts, *numbers])
+
+
+@inline_kernel
+def section(parameters, index):
+    """The numbers of the index-th force effect."""
+    return parameters[int(parameters[GRAVITY + index]) : int(parameters[GRAVITY + index + 1])]
+
+
+def step_source(effects: Sequence[Effect], constrained: bool, integrator: str) -> str:
     """The text of a scene's step module."""
     source = Path(__file__).with_name("step.py").read_text()
-    calls, slopes, imports = [], [], []
-    first = GRAVITY
-    for effect in effects:
-        if effect.compiled is None:
-            continue
-        last = first + len(effect.parameters(tree))
+    calls, slopes, imports = [], [], ["from physics_prior.dynamics.compose import section"]
+    for index, effect in enumerate(effect for effect in effects if effect.compiled is not None):
         for function, arguments, lines in (
             (effect.compiled.apply, "links, work, q, v, tau", calls),
             (effect.compiled.differentiate, "links, work, q, v, tau_q, tau_v", slopes),
         ):
             name = function.py_func.__name__
-            lines.append(f"    {name}(parameters[{first}:{last}], {arguments})  # {effect.label}")
+            lines.append(f"    {name}(section(parameters, {index}), {arguments})")
             line = f"from {function.py_func.__module__} import {name}"
             if line not in imports:
                 imports.append(line)
-        first = last
     composed = "\n".join(imports)
     if calls:
         composed += (
-            "\n\n\n@kernel\ndef forces(parameters, links, work, q, v, tau):\n" + "\n".join(calls)
+            "\n\n\n@kernel\ndef forces(parameters, links, work, q, v, tau):\n"
+            + "\n".join(calls)
             + "\n\n\n@kernel\ndef differentiate_forces(parameters, links, work, q, v, tau_q, tau_v):\n"
-            + "\n".join(slopes) + "\n"
+            + "\n".join(slopes)
+            + "\n"
         )
         source = _replace(source, "effects", composed)
     source = _replace(source, "constraints", f"CONSTRAINED = {constrained}")
     return _replace(source, "integrator", f"RUNGE_KUTTA = {integrator == RUNGE_KUTTA}")
 
 
-def step_module(tree: Tree, effects: Sequence[Effect], constrained: bool, integrator: str) -> ModuleType:
+def step_module(effects: Sequence[Effect], constrained: bool, integrator: str) -> ModuleType:
     """The step module of a scene, written to the kernel cache where it is not there yet, and imported."""
-    text = step_source(tree, effects, constrained, integrator)
+    text = step_source(effects, constrained, integrator)
     name = "step_" + hashlib.sha256(text.encode()).hexdigest()[:16]
     if name in sys.modules:
         return sys.modules[name]

@@ -22,6 +22,7 @@ from physics_prior.dynamics.algebra import (
     times,
 )
 from physics_prior.dynamics.articulated_body import factorize, pull, push
+from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import move
 from physics_prior.dynamics.manifold import displace
@@ -120,7 +121,8 @@ def acceleration_error(work, pairs, gravity, out):
         pair = pairs[p]
         a, b = get3(pair.a), get3(pair.b)
         gap_acceleration = minus(
-            point_acceleration(work, pair.link_b, b, gravity), point_acceleration(work, pair.link_a, a, gravity)
+            point_acceleration(work, pair.link_b, b, gravity),
+            point_acceleration(work, pair.link_a, a, gravity),
         )
         for row in range(pair.rows):
             error = dot(direction(pair, row), gap_acceleration)
@@ -136,12 +138,12 @@ def acceleration_error(work, pairs, gravity, out):
 def assemble(links, work, pairs, nv, rows):
     """Fill Y, Z, A M^-1 A^T and its regularised Cholesky factor; return the rank. Needs factors and ``place``."""
     m = rows.shape[0]
-    rows[:, : 2 * nv] = 0.0
     for p in range(pairs.shape[0]):
         pair = pairs[p]
         for row in range(pair.rows):
             r = pair.first + row
             d = direction(pair, row)
+            clear(rows[r, : 2 * nv])
             push(links, work, pair.link_b, get3(pair.b), d, 1.0, rows[r, :nv], rows[r, nv : 2 * nv])
             push(links, work, pair.link_a, get3(pair.a), d, -1.0, rows[r, :nv], rows[r, nv : 2 * nv])
     trace = 0.0
@@ -180,7 +182,8 @@ def multiply(rows, nv):
     left = rows[:, 2 * nv + 2 * m]
     answer = rows[:, 2 * nv + 2 * m + 1]
     change = rows[:, 2 * nv + 2 * m + 2]
-    answer[:] = 0.0
+    for r in range(m):
+        answer[r] = 0.0
     for _ in range(REFINEMENTS):
         for r in range(m):
             total = left[r]

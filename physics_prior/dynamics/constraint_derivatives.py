@@ -90,9 +90,7 @@ def turned(pair, row, gap):
 
 
 @kernel
-def differentiate_rows(
-    links, work, pairs, freedom_records, composites, gravity, gaps, A, A_q, rows_q, rows_v, tau_q
-):
+def differentiate_rows(links, work, pairs, freedom_records, composites, gravity, gaps, A, A_q, rows_q, rows_v, tau_q):
     """Fill the derivatives of all rows, and take those of A^T lambda from tau_q (nv, nv).
 
     A (m, nv): the constraint Jacobian. A_q (m, nv): derivative of A v by q. rows_q, rows_v (m, nv): of the rows'

@@ -4,12 +4,12 @@ Inverse dynamics by spatial vectors: Singh, Russo and Wensing 2022 (their Psi-do
 counts as a translation that carries a ball joint. Forward dynamics follow from them through the articulated-body factors.
 """
 
-
 import numpy as np
 
 from physics_prior.dynamics.algebra import cross, get3, get6, minus, plus, scale, symmetric_times
 from physics_prior.dynamics.articulated_body import pull, push_generalized
 from physics_prior.dynamics.gyroscopic import middle_correction
+from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import freedom, freedoms
 from physics_prior.dynamics.records import FREE, SPHERICAL
@@ -129,8 +129,8 @@ def sweep(links, work, gravity, step, freedom_records, composites):
 @kernel
 def inverse_dynamics_derivatives(links, freedom_records, composites, tau_q, tau_v):
     """Fill the derivatives of inverse dynamics at fixed vdot, (nv, nv) each, after ``sweep``; no external forces."""
-    tau_q[:, :] = 0.0
-    tau_v[:, :] = 0.0
+    clear(tau_q)
+    clear(tau_v)
     for i in range(links.shape[0]):
         link, own = links[i], composites[i]
         f = get_spatial(own.f)
@@ -140,9 +140,7 @@ def inverse_dynamics_derivatives(links, freedom_records, composites, tau_q, tau_
             S, psi_dot = get_spatial(record.S), get_spatial(record.psi_dot)
             psi_ddot, rate = get_spatial(record.psi_ddot), add(psi_dot, get_spatial(record.S_dot))
             row_B, row_I = rows_times(own.B, S), columns_times(own.I, S)
-            column_q = add(
-                add(columns_times(own.B, psi_dot), columns_times(own.I, psi_ddot)), cross_force(S, f)
-            )
+            column_q = add(add(columns_times(own.B, psi_dot), columns_times(own.I, psi_ddot)), cross_force(S, f))
             column_v = add(columns_times(own.B, S), columns_times(own.I, rate))
             j = i
             while j >= 0:
@@ -155,9 +153,7 @@ def inverse_dynamics_derivatives(links, freedom_records, composites, tau_q, tau_
                     up = freedom_records[n]
                     S_up, psi_up = get_spatial(up.S), get_spatial(up.psi_dot)
                     tau_q[k, n] = power(psi_up, row_B) + power(get_spatial(up.psi_ddot), row_I)
-                    tau_v[k, n] = power(S_up, row_B) + power(
-                        add(psi_up, get_spatial(up.S_dot)), row_I
-                    )
+                    tau_v[k, n] = power(S_up, row_B) + power(add(psi_up, get_spatial(up.S_dot)), row_I)
                     if j != i or (translation_carries_ball and c >= 3 and e < 3):
                         tau_q[n, k] = power(S_up, column_q)
                         tau_v[n, k] = power(S_up, column_v)
@@ -170,5 +166,3 @@ def apply_inverse_mass(links, work, columns, spare):
     for r in range(columns.shape[0]):
         push_generalized(links, work, columns[r], spare[0])
         pull(links, work, spare[0], columns[r])
-
-

@@ -55,8 +55,8 @@ def _compile(function: Callable[..., Any], inline: bool) -> Any:
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(cache_directory())
     try:
-        return numba.njit(
-            cache=True, error_model="numpy", fastmath=FASTMATH, forceinline=inline, boundscheck=False
-        )(function)
+        return numba.njit(cache=True, error_model="numpy", fastmath=FASTMATH, forceinline=inline, boundscheck=False)(
+            function
+        )
     finally:
         numba.config.CACHE_DIR = before

@@ -20,6 +20,7 @@ from physics_prior.dynamics.algebra import (
     symmetric_times,
     times,
 )
+from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import FREE, PRISMATIC, REVOLUTE, SPHERICAL
 
@@ -110,7 +111,7 @@ def point_jacobian(links, work, link_index, point, jacobian):
 
     point (3,) stands in the link's frame, m. Columns of joints that do not carry the link are zero.
     """
-    jacobian[:, :] = 0.0
+    clear(jacobian)
     i = link_index
     if i < 0:
         return

@@ -58,9 +58,7 @@ def right_jacobian(theta):
     if square < 1e-6:
         return _skew_polynomial(theta, -0.5 + square / 24.0, 1.0 / 6.0 - square / 120.0)
     angle = math.sqrt(square)
-    return _skew_polynomial(
-        theta, -(1.0 - math.cos(angle)) / square, (angle - math.sin(angle)) / (square * angle)
-    )
+    return _skew_polynomial(theta, -(1.0 - math.cos(angle)) / square, (angle - math.sin(angle)) / (square * angle))
 
 
 @inline_kernel
@@ -78,9 +76,7 @@ def local_rate_by_theta(theta, omega, direction):
     """The derivative of local_rate by theta along a direction."""
     once = cross(theta, omega)
     turned = cross(direction, omega)
-    return plus(
-        scale(0.5, turned), scale(1.0 / 12.0, plus(cross(direction, once), cross(theta, turned)))
-    )
+    return plus(scale(0.5, turned), scale(1.0 / 12.0, plus(cross(direction, once), cross(theta, turned))))
 
 
 @kernel
@@ -139,9 +135,7 @@ def rate_derivative(links, theta, v, theta_x, v_x, out):
                 n += 3
             angle, omega = (theta[n], theta[n + 1], theta[n + 2]), (v[n], v[n + 1], v[n + 2])
             for j in range(columns):
-                by_theta = local_rate_by_theta(
-                    angle, omega, (theta_x[n, j], theta_x[n + 1, j], theta_x[n + 2, j])
-                )
+                by_theta = local_rate_by_theta(angle, omega, (theta_x[n, j], theta_x[n + 1, j], theta_x[n + 2, j]))
                 by_v = local_rate(angle, (v_x[n, j], v_x[n + 1, j], v_x[n + 2, j]))
                 for c in range(3):
                     out[n + c, j] = by_theta[c] + by_v[c]

@@ -20,6 +20,7 @@ from physics_prior.dynamics.algebra import (
     transposed_times,
 )
 from physics_prior.dynamics.articulated_body import rigid_inertias, shift_to_parent
+from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kinematics import freedom, freedoms
 from physics_prior.dynamics.records import FREE, PRISMATIC, REVOLUTE
@@ -60,13 +61,9 @@ def transmit(links, work):
     for i in range(links.shape[0]):
         here = work[i]
         omega, center, alpha = get3(here.omega), get3(here.center), get3(here.alpha)
-        acceleration = plus(
-            plus(get3(here.acceleration), cross(alpha, center)), cross(omega, cross(omega, center))
-        )
+        acceleration = plus(plus(get3(here.acceleration), cross(alpha, center)), cross(omega, cross(omega, center)))
         force = scale(links[i].mass, acceleration)
-        moment = plus(
-            plus(symmetric_times(get6(here.inertia), alpha), get3(here.gyroscopic)), cross(center, force)
-        )
+        moment = plus(plus(symmetric_times(get6(here.inertia), alpha), get3(here.gyroscopic)), cross(center, force))
         put3(here.bias_moment, minus(moment, get3(here.moment)))
         put3(here.bias_force, minus(force, get3(here.force)))
     for i in range(links.shape[0] - 1, -1, -1):
@@ -94,22 +91,18 @@ def inverse_dynamics(links, work, vdot, gravity, tau):
             if link.kind == FREE:
                 tau[n], tau[n + 1], tau[n + 2] = get3(here.bias_force)
                 n += 3
-            tau[n], tau[n + 1], tau[n + 2] = transposed_times(
-                get9(here.rotation), get3(here.bias_moment)
-            )
+            tau[n], tau[n + 1], tau[n + 2] = transposed_times(get9(here.rotation), get3(here.bias_moment))
 
 
 @kernel
 def mass_matrix(links, work, M):
     """Fill M (nv, nv) from composite inertias; needs the kinematics and overwrites the factors."""
-    M[:, :] = 0.0
+    clear(M)
     rigid_inertias(links, work)
     for i in range(links.shape[0] - 1, -1, -1):
         if links[i].parent >= 0:
             here = work[i]
-            shift_to_parent(
-                work[links[i].parent], get3(here.arm), get6(here.J), get9(here.H), get6(here.M)
-            )
+            shift_to_parent(work[links[i].parent], get3(here.arm), get6(here.J), get9(here.H), get6(here.M))
     for i in range(links.shape[0]):
         link = links[i]
         for c in range(freedoms(link.kind)):

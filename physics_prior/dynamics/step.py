@@ -11,6 +11,7 @@ records.py, constraint.py), and the numbers of the effects, gravity first.
 import math
 
 from physics_prior.dynamics.articulated_body import accelerate, factorize
+from physics_prior.dynamics.arrays import accumulate, clear, copy
 from physics_prior.dynamics.constraint import constrain_acceleration, multiply, place, project, respond
 from physics_prior.dynamics.constraint_derivatives import differentiate_rows
 from physics_prior.dynamics.derivatives import apply_inverse_mass, inverse_dynamics_derivatives, sweep
@@ -34,7 +35,7 @@ def evaluate(links, work, pairs, rows, parameters, q, v, extra, step, vdot, spar
     move(links, work, q, v)
     if step > 0.0:
         take_at_middle(links, work, step)
-    tau[:] = extra
+    copy(extra, tau)
     forces(parameters, links, work, q, v, tau)
     factorize(links, work)
     accelerate(links, work, tau, gravity, vdot)
@@ -45,24 +46,23 @@ def evaluate(links, work, pairs, rows, parameters, q, v, extra, step, vdot, spar
 
 
 @kernel
-def advance(links, work, pairs, rows, parameters, q, v, extra, h, count, scratch):
+def advance(links, work, pairs, rows, parameters, q, v, extra, h, count, start, scratch):
     """Move q (nq,) and v (nv,) in place by count steps of h seconds; return the constraints' rank.
 
     Semi-implicit Euler, or the classical Runge-Kutta method of order four in the coordinates theta of q0 [+] theta (Munthe-Kaas
-    1999). Constraints are projected after each step. extra (nv,) is constant; scratch (9, nv + 1) beside q0.
+    1999). Constraints are projected after each step. extra (nv,) is constant; start (nq,), scratch (9, nv).
     """
     nv = v.shape[0]
-    spare, vdot, theta, middle = scratch[0:3, :nv], scratch[3, :nv], scratch[4, :nv], scratch[5, :nv]
-    theta_rate, theta_sum, v_sum = scratch[6, :nv], scratch[7, :nv], scratch[8, :nv]
-    start = scratch[9, : q.shape[0]]
+    spare, vdot, theta, middle = scratch[0:3], scratch[3], scratch[4], scratch[5]
+    theta_rate, theta_sum, v_sum = scratch[6], scratch[7], scratch[8]
     rank = 0
     for _ in range(count):
         if RUNGE_KUTTA:
-            start[:] = q
-            middle[:] = v
-            theta[:] = 0.0
-            theta_sum[:] = 0.0
-            v_sum[:] = 0.0
+            copy(q, start)
+            copy(v, middle)
+            clear(theta)
+            clear(theta_sum)
+            clear(v_sum)
             for stage in range(4):
                 rank = evaluate(links, work, pairs, rows, parameters, q, middle, extra, 0.0, vdot, spare)
                 rate(links, theta, middle, theta_rate)
@@ -90,7 +90,9 @@ def advance(links, work, pairs, rows, parameters, q, v, extra, h, count, scratch
 
 
 @kernel
-def differentiate(links, work, pairs, rows, parameters, q, v, step, derivative, matrices, freedoms, composites, gaps, spare):
+def differentiate(
+    links, work, pairs, rows, parameters, q, v, step, derivative, matrices, freedoms, composites, gaps, spare
+):
     """Fill derivative (2 nv, nv): row j is the derivative of vdot by the j-th tangent of q, row nv + j by v_j.
 
     Needs ``evaluate`` at the same state. matrices (2, nv, nv) and (4, m, nv) in ``constraint_matrices`` are scratch.
@@ -104,9 +106,7 @@ def differentiate(links, work, pairs, rows, parameters, q, v, step, derivative, 
     A, A_q = matrices[2 * nv : 2 * nv + m], matrices[2 * nv + m : 2 * nv + 2 * m]
     rows_q, rows_v = matrices[2 * nv + 2 * m : 2 * nv + 3 * m], matrices[2 * nv + 3 * m : 2 * nv + 4 * m]
     if CONSTRAINED:
-        differentiate_rows(
-            links, work, pairs, freedoms, composites, gravity, gaps, A, A_q, rows_q, rows_v, tau_q
-        )
+        differentiate_rows(links, work, pairs, freedoms, composites, gravity, gaps, A, A_q, rows_q, rows_v, tau_q)
     for i in range(nv):
         for j in range(nv):
             tau_q[i, j] = -tau_q[i, j]
@@ -134,7 +134,7 @@ def differentiate(links, work, pairs, rows, parameters, q, v, step, derivative, 
 def _combine(derivative, q_x, v_x, out):
     """Fill out (nv, k): the derivative of vdot from those of q and v, (nv, k) each."""
     nv = v_x.shape[0]
-    out[:, :] = 0.0
+    clear(out)
     for j in range(nv):
         for i in range(nv):
             by_q, by_v = derivative[j, i], derivative[nv + j, i]
@@ -172,15 +172,43 @@ def tangent_rows(links, work, pairs, rows, parameters, q, v, A, A_q, matrices, f
     place(work, pairs)
     sweep(links, work, parameters[:3], 0.0, freedoms, composites)
     differentiate_rows(
-        links, work, pairs, freedoms, composites, parameters[:3], gaps, A, A_q,
-        matrices[2 * nv + 2 * m : 2 * nv + 3 * m], matrices[2 * nv + 3 * m : 2 * nv + 4 * m], matrices[0:nv],
+        links,
+        work,
+        pairs,
+        freedoms,
+        composites,
+        parameters[:3],
+        gaps,
+        A,
+        A_q,
+        matrices[2 * nv + 2 * m : 2 * nv + 3 * m],
+        matrices[2 * nv + 3 * m : 2 * nv + 4 * m],
+        matrices[0:nv],
     )
 
 
 @kernel
 def linearise(
-    links, work, pairs, rows, parameters, q, v, extra, h, force_noise, F, G,
-    derivative, matrices, stages, freedoms, composites, gaps, scratch,
+    links,
+    work,
+    pairs,
+    rows,
+    parameters,
+    q,
+    v,
+    extra,
+    h,
+    force_noise,
+    F,
+    G,
+    derivative,
+    matrices,
+    stages,
+    freedoms,
+    composites,
+    gaps,
+    start,
+    scratch,
 ):
     """Make one step as ``advance`` does and fill its derivatives.
 
@@ -189,30 +217,42 @@ def linearise(
     double integrator's exact second moments. stages (7, nv, 2 nv), matrices (2 nv + 4 m, nv) are scratch.
     """
     nv = v.shape[0]
-    spare, vdot, theta, middle = scratch[0:3, :nv], scratch[3, :nv], scratch[4, :nv], scratch[5, :nv]
-    theta_rate, theta_sum, v_sum = scratch[6, :nv], scratch[7, :nv], scratch[8, :nv]
-    start = scratch[9, : q.shape[0]]
+    spare, vdot, theta, middle = scratch[0:3], scratch[3], scratch[4], scratch[5]
+    theta_rate, theta_sum, v_sum = scratch[6], scratch[7], scratch[8]
     start_x, theta_x, v_x, q_x = stages[0], stages[1], stages[2], stages[3]
     rate_x, theta_sum_x, v_sum_x = stages[4], stages[5], stages[6]
-    start_x[:, :] = 0.0
-    v_x[:, :] = 0.0
-    theta_x[:, :] = 0.0
-    theta_sum_x[:, :] = 0.0
-    v_sum_x[:, :] = 0.0
+    clear(start_x)
+    clear(v_x)
+    clear(theta_x)
+    clear(theta_sum_x)
+    clear(v_sum_x)
     for k in range(nv):
         start_x[k, k] = 1.0
         v_x[k, nv + k] = 1.0
         theta[k], theta_sum[k], v_sum[k] = 0.0, 0.0, 0.0
-    start[:] = q
-    middle[:] = v
-    q_x[:, :] = start_x
+    copy(q, start)
+    copy(v, middle)
+    copy(start_x, q_x)
     step = 0.0 if RUNGE_KUTTA else h
     m = rows.shape[0]
     A, A_q = matrices[2 * nv : 2 * nv + m], matrices[2 * nv + m : 2 * nv + 2 * m]
     for stage in range(4 if RUNGE_KUTTA else 1):
         rank = evaluate(links, work, pairs, rows, parameters, q, middle, extra, step, vdot, spare)
         differentiate(
-            links, work, pairs, rows, parameters, q, middle, step, derivative, matrices, freedoms, composites, gaps, spare
+            links,
+            work,
+            pairs,
+            rows,
+            parameters,
+            q,
+            middle,
+            step,
+            derivative,
+            matrices,
+            freedoms,
+            composites,
+            gaps,
+            spare,
         )
         if stage == 0:
             _force_noise(links, work, force_noise, h, G, spare)
@@ -223,38 +263,38 @@ def linearise(
             rate_derivative(links, theta, middle, theta_x, v_x, rate_x)
             weight = h / 6.0 if stage == 0 or stage == 3 else h / 3.0
             ahead = h if stage == 2 else 0.5 * h
-            _accumulate(weight, rate_x, theta_sum_x)
+            accumulate(weight, rate_x, theta_sum_x)
             for k in range(nv):
                 theta_sum[k] += weight * theta_rate[k]
                 v_sum[k] += weight * vdot[k]
                 theta[k] = ahead * theta_rate[k]
                 middle[k] = v[k] + ahead * vdot[k]
-            theta_x[:, :] = 0.0
-            _accumulate(ahead, rate_x, theta_x)
+            clear(theta_x)
+            accumulate(ahead, rate_x, theta_x)
             _combine(derivative, q_x, v_x, rate_x)
-            _accumulate(weight, rate_x, v_sum_x)
-            v_x[:, :] = 0.0
+            accumulate(weight, rate_x, v_sum_x)
+            clear(v_x)
             for k in range(nv):
                 v_x[k, nv + k] = 1.0
-            _accumulate(ahead, rate_x, v_x)
+            accumulate(ahead, rate_x, v_x)
             if stage < 3:
                 displace(links, start, theta, q)
                 displacement_derivative(links, theta, start_x, theta_x, q_x)
         else:
             _combine(derivative, q_x, v_x, rate_x)
-            _accumulate(h, rate_x, v_sum_x)
+            accumulate(h, rate_x, v_sum_x)
             for k in range(nv):
                 v_sum[k] = h * vdot[k]
                 theta_sum[k] = h * (v[k] + v_sum[k])
                 theta_sum_x[k, nv + k] = h
-            _accumulate(h, v_sum_x, theta_sum_x)
+            accumulate(h, v_sum_x, theta_sum_x)
     displace(links, start, theta_sum, q)
     displacement_derivative(links, theta_sum, start_x, theta_sum_x, q_x)
     for k in range(nv):
         v[k] += v_sum[k]
         v_sum_x[k, nv + k] += 1.0
-        F[k] = q_x[k]
-        F[nv + k] = v_sum_x[k]
+    copy(q_x, F[:nv])
+    copy(v_sum_x, F[nv:])
     if CONSTRAINED:
         project(links, work, pairs, rows, q, v, spare)
         tangent_rows(links, work, pairs, rows, parameters, q, v, A, A_q, matrices, freedoms, composites, gaps)
@@ -264,22 +304,14 @@ def linearise(
 
 
 @kernel
-def _accumulate(s, source, out):
-    """Add s source to out."""
-    for i in range(out.shape[0]):
-        for c in range(out.shape[1]):
-            out[i, c] += s * source[i, c]
-
-
-@kernel
 def _force_noise(links, work, force_noise, h, G, spare):
     """Fill G (2 nv, 2 nv) from white generalized forces over h seconds; needs factors."""
     nv = force_noise.shape[0]
-    G[:, :] = 0.0
+    clear(G)
     near, far, late = h * math.sqrt(h / 3.0), 0.5 * math.sqrt(3.0 * h), 0.5 * math.sqrt(h)
     for j in range(nv):
         if force_noise[j] > 0.0:
-            spare[2, :] = 0.0
+            clear(spare[2])
             spare[2, j] = force_noise[j]
             apply_inverse_mass(links, work, spare[2:3], spare)
             for k in range(nv):

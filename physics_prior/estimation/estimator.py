@@ -1,5 +1,6 @@
 """The estimator: measurements in, estimates out. The one core behind both doors, the node and the replay."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -28,6 +29,7 @@ class Estimator:
         scene, simulator, filter: what it works with.
         history: what it remembers.
         last_rejection: why the last rejected measurement was.
+        on_settled: told each node whose outcome is final, oldest first.
     """
 
     def __init__(self, scene: Scene, process: str = "physics", history_length: float = 1.0) -> None:
@@ -38,6 +40,7 @@ class Estimator:
         self.last_rejection = ""
         self._read = self._late = self._rejected = 0
         self._dropped = Counts()
+        self.on_settled: Callable[[Node], None] = lambda node: None
         self._waiting: list[Measurement] = []
         self._stale: list[Measurement] = []
 
@@ -57,6 +60,12 @@ class Estimator:
         used = sum(node.posterior.used is True for node in self.history.nodes)
         gated = sum(node.posterior.used is False for node in self.history.nodes)
         return Counts(self._read, self._dropped.used + used, self._dropped.gated + gated, self._late, self._rejected)
+
+    def finish(self) -> None:
+        """Settle all that the history still holds: no more measurements will come. The estimate is gone then."""
+        for node in self.history.nodes:
+            self._settle(node)
+        self.reset()
 
     def reset(self) -> None:
         """Forget all measurements; the next ones start it cold."""
@@ -103,7 +112,7 @@ class Estimator:
         """Health of the estimate at a stamp, ns."""
         if not self.history:
             return Health(Level.LOST, "waiting for measurements that fix the configuration")
-        return self._health(self.history.nodes[-1].posterior, stamp)
+        return self.health_of(self.history.nodes[-1].posterior, stamp)
 
     def describe(self, posterior: Posterior) -> Estimate:
         """The estimate that a posterior stands for: forces and their uncertainty, and its health."""
@@ -127,7 +136,7 @@ class Estimator:
             wrench_deviations=dict(zip(simulator.wrench_names, deviations, strict=True)),
             constraint_error=float(np.max(np.abs(error))) if len(error) else 0.0,
             rank=rank,
-            health=self._health(posterior, posterior.stamp),
+            health=self.health_of(posterior, posterior.stamp),
             nis=(posterior.nis, posterior.dimension),
         )
 
@@ -149,7 +158,8 @@ class Estimator:
             total += ((pair[0] - pair[1]) / (2.0 * DIFFERENCE)) ** 2
         return np.sqrt(total)
 
-    def _health(self, posterior: Posterior, stamp: int) -> Health:
+    def health_of(self, posterior: Posterior, stamp: int) -> Health:
+        """Health of a posterior at a stamp, ns, that may be later than its own."""
         age = (stamp - posterior.accepted) * 1e-9
         if age > self.scene.health.lost_after:
             return Health(Level.LOST, f"no measurement was accepted for {age:.1f} s")
@@ -195,12 +205,14 @@ class Estimator:
             self._read -= len(again)
             self._rejected -= len(again) - 1
             self.last_rejection = "time jumped back: the estimate was started anew"
-            return any([self.add(each) for each in again])
+            changed = [self.add(each) for each in again]
+            return any(changed)
         self._rejected += 1
         self.last_rejection = f"topic '{measurement.topic}': a measurement was doubled or older than the history"
         return False
 
     def _settle(self, node: Node) -> None:
-        """Count a node that leaves the history for good."""
+        """Count a node whose outcome is final, and hand it on."""
         self._dropped.used += node.posterior.used is True
         self._dropped.gated += node.posterior.used is False
+        self.on_settled(node)

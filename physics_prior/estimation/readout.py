@@ -99,7 +99,7 @@ def measured_acceleration(acceleration: np.ndarray) -> np.ndarray | None:
 
 
 def difference(end: np.ndarray, start: np.ndarray, angle: bool) -> np.ndarray:
-    """end - start, the shorter way round for angles."""
+    """End - start, the shorter way round for angles."""
     delta = np.asarray(end) - np.asarray(start)
     return (delta + np.pi) % (2.0 * np.pi) - np.pi if angle else delta
 

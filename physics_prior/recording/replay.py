@@ -1,0 +1,320 @@
+"""Replay: a recording through the estimator, as fast as it goes and without ROS; the second door to the one core.
+
+Messages are taken in the order in which they were logged, so that late ones come late here too. Where nothing comes, the
+estimate is carried on at the rate at which the node would publish it.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from physics_prior.errors import MeasurementError, RecordingError
+from physics_prior.estimation.estimate import Counts, Health, Level
+from physics_prior.estimation.estimator import Estimator
+from physics_prior.estimation.filter import Posterior
+from physics_prior.estimation.history import Node
+from physics_prior.estimation.readout import deviations, evaluate, measured_acceleration, unit
+from physics_prior.estimation.score import FROM_SECONDS, Reference, Score
+from physics_prior.estimation.smoother import smooth as smooth_nodes
+from physics_prior.interface import Output, measurement_of
+from physics_prior.recording.cdr import decode
+from physics_prior.recording.messages import JointState
+from physics_prior.recording.reader import BagReader, Record, open_bag
+from physics_prior.recording.writer import BagWriter
+from physics_prior.scene import Scene
+
+NANOSECONDS = 1e9
+BAND = 0.95
+HISTORY_SECONDS = 1.0
+MARKER_PERIOD = 1.0 / 30.0  # s
+DIAGNOSTICS_PERIOD = 1.0  # s
+FOREVER = 1e9  # s
+
+
+@dataclass
+class ReplayResult:
+    """What a replay found.
+
+    Attributes:
+        scene: what was estimated; smoothed: by all measurements or only by past ones.
+        stamps: (k,) seconds after the first estimate.
+        readouts, deviations: readout name -> (k,) or (k, 3); values and standard deviations; units by name.
+        health: (k,) Level.
+        reference_stamps, reference: (r,) seconds, and name -> (r,), where there is one.
+        nis_stamps, nis, nis_dimension: (n,) seconds and innovations of each measurement that was used or gated.
+        gated, topics: (n,) whether the gate refused it, and where it came from.
+        counts: what became of the measurements; loss: what a damaged bag lost, or None.
+        score: errors against the reference (Score.summary), or None.
+        span_s, wall_s, health_s: seconds of the recording, of the replay, and in each health.
+    """
+
+    scene: Scene
+    smoothed: bool
+    counts: Counts = field(default_factory=Counts)
+    loss: str | None = None
+    stamps: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    readouts: dict[str, np.ndarray] = field(default_factory=dict)
+    deviations: dict[str, np.ndarray] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    health: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    reference_stamps: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    reference: dict[str, np.ndarray] = field(default_factory=dict)
+    nis_stamps: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    nis: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    nis_dimension: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    gated: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    topics: list[str] = field(default_factory=list)
+    score: dict[str, float | None] | None = None
+    span_s: float = 0.0
+    wall_s: float = 0.0
+    health_s: dict[str, float] = field(default_factory=dict)
+
+    def summary(self) -> dict[str, Any]:
+        """The figures of ``replay --json``: plain numbers, None where there is none."""
+        nis, dimension = self.nis[~self.gated], self.nis_dimension[~self.gated]
+        mean = expected = low = high = None
+        if len(nis):
+            mean, expected = float(nis.mean()), float(dimension.mean())
+            low, high = (float(bound) / len(nis) for bound in chi2.interval(BAND, float(dimension.sum())))
+        return {
+            "measurements": dict(vars(self.counts)),
+            "span_s": self.span_s,
+            "wall_s": self.wall_s,
+            "realtime_factor": self.span_s / self.wall_s if self.wall_s > 0.0 else None,
+            "nis": {"mean": mean, "expected": expected, "band95": [low, high]},
+            "health": self.health_s,
+            "reference": self.score,
+        }
+
+
+def replay(
+    bag: Path,
+    scene: Scene,
+    out: Path | None = None,
+    smooth: bool = False,
+    process: str = "physics",
+    reference: str | None = None,
+    publish_rate: float = 30.0,
+    progress: Callable[[float], None] | None = None,
+) -> ReplayResult:
+    """Run a recording through a scene's estimator.
+
+    out: a bag to write, with the topics of the node. smooth: estimate each stamp from the whole recording. reference: a
+    JointState topic to score against. publish_rate: Hz, of predictions where nothing is measured. progress: told the share
+    that is done.
+
+    Raises:
+        RecordingError: the bag, a topic or the output is not usable; nothing is left half-written.
+        SimulationError: the scene's motion cannot be computed.
+    """
+    return _Replay(bag, scene, smooth, process, reference, publish_rate).run(out, progress)
+
+
+class _Replay:
+    """One run: the estimator, what it said, and where that goes."""
+
+    def __init__(
+        self, bag: Path, scene: Scene, smoothed: bool, process: str, reference: str | None, publish_rate: float
+    ) -> None:
+        self.reader = open_bag(bag)
+        self.scene, self.smoothed, self.period = scene, smoothed, 1.0 / publish_rate
+        self.sources = _sources(self.reader, scene)
+        self.reference = _read_reference(self.reader, reference) if reference is not None else None
+        self.estimator = Estimator(scene, process, FOREVER if smoothed else HISTORY_SECONDS)
+        self.estimator.on_settled = self._settle
+        self.simulator, self.process = self.estimator.simulator, self.estimator.filter.process
+        self.score = Score(scene, self.simulator, self.reference.names) if self.reference is not None else None
+        self.result = ReplayResult(scene, smoothed, loss=self.reader.loss)
+        self.settled: list[Node] = []
+        self.rows: list[tuple[int, int, dict[str, np.ndarray], dict[str, np.ndarray]]] = []
+        self.innovations: list[tuple[int, float, int, bool, str]] = []
+        self.first_stamp: int | None = None
+        self.next_markers = self.next_diagnostics = 0
+
+    def run(self, out: Path | None, progress: Callable[[float], None] | None) -> ReplayResult:
+        began = time.perf_counter()
+        with ExitStack() as stack:
+            self.writer = stack.enter_context(BagWriter(out)) if out is not None else None
+            self.output = Output(self.scene, self.simulator)
+            if self.writer is not None:
+                for topic, message_type in self.output.topics.items():
+                    self.writer.add_topic(_absolute(topic), message_type)
+            for log_time, posterior in self._posteriors(progress):
+                if not self.smoothed:
+                    self._emit(posterior, log_time)
+            self.estimator.finish()
+            if self.smoothed:
+                for posterior in smooth_nodes(self.estimator.filter, self.settled, self.period):
+                    self._emit(posterior, posterior.stamp)
+        self._finish(time.perf_counter() - began)
+        return self.result
+
+    def _posteriors(self, progress: Callable[[float], None] | None) -> Iterator[tuple[int, Posterior]]:
+        """The last posterior at each stamp, and predictions where none comes, with the log time of each."""
+        total = sum(self.reader.topics[topic].count for topic in self.sources)
+        pending: tuple[int, Posterior] | None = None
+        coasting = 0
+        self.first_log = self.last_log = 0
+        for index, record in enumerate(self.reader.read(self.sources)):
+            self.first_log = self.first_log or record.log_time_ns
+            self.last_log = max(self.last_log, record.log_time_ns)
+            if progress is not None and index % 100 == 0:
+                progress(index / total)
+            if pending is not None:
+                period = round(self.period * NANOSECONDS)
+                while record.log_time_ns - pending[0] > period + coasting:
+                    if coasting == 0:
+                        yield pending
+                    coasting += period
+                    yield pending[0] + coasting, self._carried(pending[1], coasting)
+            if self._take(record):
+                newest = self.estimator.history.nodes[-1].posterior
+                if pending is not None and pending[1].stamp != newest.stamp and coasting == 0:
+                    yield pending
+                pending, coasting = (record.log_time_ns, newest), 0
+        if pending is not None and coasting == 0:
+            yield pending
+        if progress is not None:
+            progress(1.0)
+
+    def _carried(self, posterior: Posterior, ahead: int) -> Posterior:
+        return self.estimator.filter.predict(posterior, posterior.stamp + ahead)
+
+    def _take(self, record: Record) -> bool:
+        """Translate a record and add it; what cannot be translated is counted as rejected."""
+        try:
+            message = decode(record.message_type, record.data)
+            measurement = measurement_of(self.sources[record.topic], message, self.scene)
+        except (MeasurementError, RecordingError) as problem:
+            self.estimator.reject(str(problem))
+            return False
+        return self.estimator.add(measurement)
+
+    def _emit(self, posterior: Posterior, log_time: int) -> None:
+        """Note an estimate, score it and file it."""
+        health = self.estimator.health_of(posterior, posterior.stamp)
+        if self.first_stamp is None:
+            self.first_stamp = posterior.stamp
+        state = posterior.state
+        vdot = measured_acceleration(state.acceleration)
+        values = evaluate(self.scene.readouts, self.simulator, state.q, state.v, vdot)
+        spread = deviations(self.scene.readouts, self.simulator, self.process, posterior)
+        self.rows.append((posterior.stamp, int(health.level), values, spread))
+        self._compare(posterior, vdot)
+        if self.writer is not None:
+            self._file(posterior, log_time, health)
+
+    def _compare(self, posterior: Posterior, vdot: np.ndarray | None) -> None:
+        if self.reference is None or self.score is None or self.first_stamp is None:
+            return
+        if posterior.stamp - self.first_stamp < FROM_SECONDS * NANOSECONDS:
+            return
+        at = self.reference.at(posterior.stamp)
+        if at is not None:
+            names = self.reference.names
+            positions = dict(zip(names, at[0].tolist(), strict=True))
+            velocities = dict(zip(names, at[1].tolist(), strict=True))
+            self.score.add(posterior.state.q, posterior.state.v, vdot, positions, velocities)
+
+    def _file(self, posterior: Posterior, log_time: int, health: Health) -> None:
+        """Write what the node would publish: states each time, pictures and diagnostics at their own pace."""
+        assert self.writer is not None
+        estimate = self.estimator.describe(posterior)
+        publications = self.output.states(estimate)
+        if log_time >= self.next_markers:
+            publications += self.output.markers(estimate)
+            self.next_markers = log_time + round(MARKER_PERIOD * NANOSECONDS)
+        if log_time >= self.next_diagnostics:
+            publications += self.output.diagnostics(posterior.stamp, health, self.estimator.counts, estimate)
+            self.next_diagnostics = log_time + round(DIAGNOSTICS_PERIOD * NANOSECONDS)
+        for topic, message in publications:
+            self.writer.write(_absolute(topic), message, log_time)
+
+    def _settle(self, node: Node) -> None:
+        """Keep a node whose outcome is final."""
+        if self.smoothed:
+            self.settled.append(node)
+        posterior = node.posterior
+        if posterior.used is not None and posterior.dimension > 0:
+            self.innovations.append(
+                (node.measurement.stamp, posterior.nis, posterior.dimension, not posterior.used, node.measurement.topic)
+            )
+
+    def _finish(self, wall: float) -> None:
+        result = self.result
+        result.counts, result.wall_s = self.estimator.counts, wall
+        if not self.rows or self.first_stamp is None:
+            raise RecordingError(
+                f"{self.reader.path}: the measurements on {list(self.sources)} never fixed the configuration of scene"
+                f" '{self.scene.name}' ({self.estimator.last_rejection or 'too few of them agree'})"
+            )
+        stamps = np.array([row[0] for row in self.rows], dtype=np.int64)
+        result.stamps = (stamps - self.first_stamp) / NANOSECONDS
+        result.health = np.array([row[1] for row in self.rows])
+        for readout in self.scene.readouts:
+            result.readouts[readout.name] = np.array([row[2][readout.name] for row in self.rows])
+            result.deviations[readout.name] = np.array([row[3][readout.name] for row in self.rows])
+            result.units[readout.name] = unit(readout, self.simulator)
+        result.span_s = (self.last_log - self.first_log) / NANOSECONDS
+        result.health_s = _durations(stamps, result.health, self.first_log)
+        if self.innovations:
+            at, nis, dimension, gated, topics = zip(*self.innovations, strict=True)
+            result.nis_stamps = (np.array(at) - self.first_stamp) / NANOSECONDS
+            result.nis, result.nis_dimension = np.array(nis), np.array(dimension)
+            result.gated, result.topics = np.array(gated), list(topics)
+        if self.reference is not None and self.score is not None:
+            result.score = self.score.summary()
+            result.reference_stamps = (self.reference.stamps - self.first_stamp) / NANOSECONDS
+            result.reference = {
+                readout.name: self.reference.positions[:, self.reference.names.index(readout.name)]
+                for readout in self.score.compared
+            }
+
+
+def _sources(reader: BagReader, scene: Scene) -> dict[str, Any]:
+    """The scene's sources by topic, each checked to be in the bag with a type that it takes."""
+    if not scene.measurements:
+        raise RecordingError(f"scene '{scene.name}' measures nothing: add 'measurements' to replay a bag with it")
+    for source in scene.measurements:
+        reader.require_topic(source.topic, *source.message_types)
+    return {source.topic: source for source in scene.measurements}
+
+
+def _read_reference(reader: BagReader, topic: str) -> Reference:
+    """A JointState topic as a reference; velocities that are missing are NaN."""
+    reader.require_topic(topic, JointState.ros_type)
+    stamps, positions, velocities = [], [], []
+    names: tuple[str, ...] = ()
+    for record in reader.read([topic]):
+        message = decode(record.message_type, record.data)
+        assert isinstance(message, JointState)
+        names = names or tuple(message.name)
+        position, velocity = np.array(message.position), np.array(message.velocity)
+        if tuple(message.name) != names or len(position) != len(names) or len(velocity) not in (0, len(names)):
+            raise RecordingError(
+                f"{reader.path}: reference {topic} does not hold one position (and velocity) for each of {list(names)}"
+            )
+        stamps.append(message.header.stamp.sec * 10**9 + message.header.stamp.nanosec)
+        positions.append(position)
+        velocities.append(velocity if len(velocity) else np.full(len(names), np.nan))
+    order = np.argsort(stamps, kind="stable")
+    return Reference(np.array(stamps)[order], names, np.array(positions)[order], np.array(velocities)[order])
+
+
+def _absolute(topic: str) -> str:
+    return topic if topic.startswith("/") else f"/{topic}"
+
+
+def _durations(stamps: np.ndarray, health: np.ndarray, first_log: int) -> dict[str, float]:
+    """Seconds in each health: an estimate stands for the time since the one before it."""
+    out = {level.name: 0.0 for level in Level}
+    out[Level.LOST.name] += max(0.0, (int(stamps[0]) - first_log) / NANOSECONDS)
+    for span, level in zip(np.diff(stamps) / NANOSECONDS, health[1:], strict=True):
+        out[Level(int(level)).name] += max(0.0, float(span))
+    return out

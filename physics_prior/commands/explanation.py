@@ -1,0 +1,158 @@
+"""A scene, explained in tables: what is simulated, what is measured and told, what a step costs."""
+
+import statistics
+import time
+from math import degrees
+
+from rich.table import Table
+
+from physics_prior.commands.compilation import compiled
+from physics_prior.commands.terminal import console, table
+from physics_prior.dynamics.compose import step_source
+from physics_prior.dynamics.simulator import Simulator
+from physics_prior.interface import topics_of
+from physics_prior.scene import (
+    AngleReadout,
+    ForceReadout,
+    JointReadout,
+    JointSource,
+    MeasurementSource,
+    OrientationSource,
+    PointReadout,
+    PointsSource,
+    PoseSource,
+    Readout,
+    Scene,
+)
+
+ROUNDS, STEPS, LINEARISATIONS = 15, 100, 10  # of timing: medians over rounds
+
+
+def explain(scene: Scene) -> None:
+    """Print everything about a scene; compiles its step where it is not yet."""
+    simulator = compiled(scene)
+    out = console()
+    out.print(scene.name, style="bold")
+    out.print(scene.description)
+    parts = (_model(scene), _effects(scene), _measurements(scene), _readouts(scene), _state(scene, simulator))
+    for part in parts:
+        out.print()
+        out.print(part)
+
+
+def step_text(scene: Scene) -> str:
+    """The source of the scene's compiled step."""
+    constrained = any(effect.point_pairs(scene.tree) for effect in scene.effects)
+    return step_source(scene.effects, constrained, scene.step.integrator)
+
+
+def _model(scene: Scene) -> Table:
+    out = table("model", "part", "joint", "kind", "on", "mass [kg]", "q", "v", numbers=3)
+    for part, joint in zip(scene.tree.parts, scene.tree.joints, strict=True):
+        mass = f"{part.mass_properties.mass:.4g}"
+        out.add_row(part.name, joint.name, joint.kind.name.lower(), joint.parent, mass, str(joint.nq), str(joint.nv))
+    out.add_row("", "", "", "all", f"{scene.tree.mass:.4g}", str(scene.tree.nq), str(scene.tree.nv), style="bold")
+    return out
+
+
+def _effects(scene: Scene) -> Table:
+    out = table("effects: these and nothing else", "effect", "kind", "what it does", "rows", numbers=1)
+    for effect in scene.effects:
+        pairs = effect.point_pairs(scene.tree)
+        rows = sum(1 if pair.length is not None else len(pair.directions) for pair in pairs)
+        out.add_row(effect.label, effect.kind, effect.explain(scene.tree), str(rows or ""))
+    if not scene.effects:
+        out.add_row("none", "", "nothing acts on the body", "")
+    return out
+
+
+def _measurements(scene: Scene) -> Table:
+    out = table("measurements", "topic", "what", "noise", "message types")
+    for source in scene.measurements:
+        what, noise = _measured(source)
+        types = " or ".join(kind.rsplit("/", 1)[-1] for kind in source.message_types)
+        out.add_row(source.topic, what, noise, types)
+    if not scene.measurements:
+        out.add_row("none", "", "", "")
+    return out
+
+
+def _measured(source: MeasurementSource) -> tuple[str, str]:
+    """What a source measures and how noisily, for people."""
+    match source:
+        case PoseSource():
+            noise = f"{source.position_noise * 1e3:.3g} mm, {degrees(source.orientation_noise):.3g} deg"
+            return f"pose of {source.part}", noise
+        case OrientationSource():
+            return f"orientation of {source.part}", f"{degrees(source.orientation_noise):.3g} deg"
+        case PointsSource():
+            return f"{len(source.markers)} markers", f"{source.noise * 1e3:.3g} mm"
+        case JointSource():
+            return f"joints {', '.join(source.joints.values())}", f"{source.noise:.3g}"
+    raise AssertionError(f"{type(source).__name__} is not described")
+
+
+def _readouts(scene: Scene) -> Table:
+    out = table("readouts", "name", "what")
+    for readout in scene.readouts:
+        out.add_row(readout.name, _read(readout))
+    if not scene.readouts:
+        out.add_row("none", "")
+    return out
+
+
+def _read(readout: Readout) -> str:
+    """What a readout reads, for people."""
+    match readout:
+        case JointReadout():
+            return f"coordinate of joint {readout.joint}"
+        case AngleReadout():
+            return f"angle of {readout.part} about {_axis(readout.axis)}, rad"
+        case PointReadout():
+            point = ", ".join(f"{number:g}" for number in readout.point)
+            return f"point ({point}) of {readout.part} along {_axis(readout.axis)}, m"
+        case ForceReadout():
+            return f"force of {readout.constraint}, {readout.component}, N"
+    return "total energy, J"
+
+
+def _axis(axis: tuple[float, float, float]) -> str:
+    names = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
+    return names.get(axis) or "({:.3g}, {:.3g}, {:.3g})".format(*axis)
+
+
+def _state(scene: Scene, simulator: Simulator) -> Table:
+    step, with_derivatives = _cost(scene, simulator)
+    out = table("state and step", "", "")
+    out.add_row("state", f"q {simulator.nq}, v {simulator.nv}; error state {2 * simulator.nv}")
+    out.add_row("constraints", _constraints(simulator))
+    own = [topic for topic in topics_of(scene) if not topic.endswith("/stddev")]
+    out.add_row("publishes", ", ".join(own) + "; of joints and forces also TOPIC/stddev")
+    out.add_row("step", f"{scene.step.integrator}, {scene.step.size * 1e3:g} ms")
+    out.add_row("cost of a step", f"{step:.3g} us here; with its derivatives {with_derivatives:.3g} us")
+    out.add_row("faster than real time", f"{scene.step.size / step * 1e6:,.0f}x, one core")
+    return out
+
+
+def _constraints(simulator: Simulator) -> str:
+    if simulator.rows == 0:
+        return "none beside the joints"
+    rows = f"{simulator.rows} rows of rank {simulator.rank}"
+    if simulator.rank < simulator.rows:
+        return f"{rows}: the motion is unique, the split of forces is not (the smallest is given)"
+    return rows
+
+
+def _cost(scene: Scene, simulator: Simulator) -> tuple[float, float]:
+    """Microseconds of a step, plain and with its derivatives: medians, from the scene's start."""
+    plain, with_derivatives = [], []
+    for _ in range(ROUNDS):
+        q, v = scene.initial.q.copy(), scene.initial.v.copy()
+        begin = time.perf_counter()
+        simulator.advance(q, v, scene.step.size, STEPS)
+        between = time.perf_counter()
+        for _ in range(LINEARISATIONS):
+            simulator.linearise(q, v, scene.step.size, scene.noise.force)
+        plain.append((between - begin) / STEPS)
+        with_derivatives.append((time.perf_counter() - between) / (LINEARISATIONS))
+    return 1e6 * statistics.median(plain), 1e6 * statistics.median(with_derivatives)

@@ -3,8 +3,8 @@
 Nothing here needs ROS: messages are those of `recording.messages`.
 """
 
-from physics_prior.interface.intake import measurement_of
+from physics_prior.interface.intake import measurement_of, take_in
 from physics_prior.interface.output import Output
 from physics_prior.interface.topics import topics_of
 
-__all__ = ["Output", "measurement_of", "topics_of"]
+__all__ = ["Output", "measurement_of", "take_in", "topics_of"]

@@ -3,7 +3,8 @@
 import numpy as np
 
 from physics_prior import rotations
-from physics_prior.errors import MeasurementError
+from physics_prior.errors import MeasurementError, PhysicsPriorError
+from physics_prior.estimation.estimator import Estimator
 from physics_prior.estimation.measurement import (
     JointsMeasurement,
     Measurement,
@@ -12,6 +13,7 @@ from physics_prior.estimation.measurement import (
     PoseMeasurement,
 )
 from physics_prior.interface.geometry import NANOSECONDS, array_of, wxyz_of
+from physics_prior.recording.cdr import decode
 from physics_prior.recording.messages import (
     Header,
     JointState,
@@ -25,6 +27,19 @@ from physics_prior.scene import JointSource, MeasurementSource, OrientationSourc
 
 ROTATION = slice(3, 6)  # rows and columns of a 6x6 covariance
 SHOWN_NAMES = 8  # of a message's joints, in a sentence
+
+
+def take_in(estimator: Estimator, source: MeasurementSource, type_name: str, data: bytes) -> bool:
+    """Give an estimator a message as it came, CDR bytes of a ROS type; return whether the newest estimate changed.
+
+    A message that cannot be a measurement is counted as rejected, with the reason: ``estimator.last_rejection``.
+    """
+    try:
+        measurement = measurement_of(source, decode(type_name, data), estimator.scene)
+    except PhysicsPriorError as error:
+        estimator.reject(str(error))
+        return False
+    return estimator.add(measurement)
 
 
 def measurement_of(source: MeasurementSource, message: Message, scene: Scene) -> Measurement:

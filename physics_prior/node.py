@@ -1,0 +1,329 @@
+"""The ROS 2 node: measurements in, estimates out. Only the middleware is here; what messages mean is in `interface`."""
+
+import sys
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any
+
+from physics_prior.errors import PhysicsPriorError
+
+try:
+    import rclpy
+except ImportError as missing:
+    print(
+        f"physics_prior_node needs rclpy ({missing}): `pip install physics_prior[ros]`, or source a ROS 2 Jazzy setup file",
+        file=sys.stderr,
+    )
+    raise SystemExit(2) from None
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
+from rclpy.duration import Duration
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_srvs.srv import Trigger
+
+from physics_prior.estimation.estimate import Estimate, Health, Level
+from physics_prior.estimation.estimator import Estimator
+from physics_prior.interface import Output, take_in
+from physics_prior.interface.output import Publication
+from physics_prior.interface.topics import MARKERS
+from physics_prior.interface.warm_up import warm_up
+from physics_prior.recording.cdr import encode
+from physics_prior.ros_inputs import Input, ros_class
+from physics_prior.ros_parameters import AUTOSTART, declare, require_scene, why_refused
+from physics_prior.scene import MeasurementSource, load_scene
+
+IMPORTED = time.monotonic()
+FOLLOW_PERIOD = 0.2  # s, at which publishers are looked at
+OUTPUT_QUEUE = 100  # states that a slow reader may lag behind
+
+
+class PhysicsPriorNode(LifecycleNode):
+    """Estimates one scene. Parameters: `ros_parameters`; topics: the scene's and `interface.topics`; service ``~/reset``.
+
+    Configured it has compiled the scene and announced its topics; active it reads and publishes.
+
+    Raises:
+        ParameterError: a parameter that it was started with is not valid.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("physics_prior", **options)
+        self._estimator: Estimator | None = None
+        self._output: Output | None = None
+        self._publishers_by_topic: dict[str, Any] = {}
+        self._inputs: list[Input] = []
+        self._rate_timers: list[Any] = []
+        self._service: Any = None
+        self._failure: Exception | None = None
+        self._lost_before = 0
+        self._forget()
+        self.add_on_set_parameters_callback(self._judge_parameters)
+        declare(self)
+        self.add_post_set_parameters_callback(self._use_parameters)
+        backward = JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=False)
+        self._jump_handle = self.get_clock().create_jump_callback(backward, post_callback=self._time_jumped)
+
+    # Lifecycle ------------------------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Configure and activate. Raises what made that fail."""
+        for transition in (self.trigger_configure, self.trigger_activate):
+            if transition() is not TransitionCallbackReturn.SUCCESS:
+                raise self._failure or PhysicsPriorError("the node could not be activated: its log says why")
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        try:
+            self._configure()
+        except Exception as error:  # rclpy would swallow it without a word
+            self._failure = error
+            self.get_logger().error(str(error) or repr(error))
+            self._tear_down()
+            return TransitionCallbackReturn.FAILURE
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        assert self._estimator is not None
+        result = super().on_activate(state)
+        scene = self._estimator.scene
+        self._inputs = [Input(self, source, self._receive) for source in scene.measurements]
+        self._start_timers()
+        topics = ", ".join(each.topic_name for each in self._inputs)
+        self.get_logger().info(
+            f"ready {time.monotonic() - IMPORTED:.2f} s after imports: scene '{scene.name}' of {scene.tree.nv} degrees of"
+            f" freedom in frame '{scene.frame_id}', listening to {topics}"
+        )
+        return result
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._stop()
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._tear_down()
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._tear_down()
+        return super().on_shutdown(state)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._tear_down()
+        return super().on_error(state)
+
+    def destroy_node(self) -> None:
+        self._jump_handle.unregister()
+        super().destroy_node()
+
+    def _configure(self) -> None:
+        scene = load_scene(require_scene(self._value("scene")))
+        scene = replace(scene, frame_id=self._value("frame_id") or scene.frame_id)
+        warm_up(scene)
+        self._estimator = Estimator(scene, history_length=self._value("history_length"))
+        self._output = Output(scene, self._estimator.simulator)
+        for topic, message_type in self._output.topics.items():
+            # markers are latched: a viewer that comes late sees the model at once
+            durability = DurabilityPolicy.TRANSIENT_LOCAL if topic == MARKERS else DurabilityPolicy.VOLATILE
+            depth = 1 if topic == MARKERS else OUTPUT_QUEUE
+            self._publishers_by_topic[topic] = self.create_lifecycle_publisher(
+                ros_class(message_type.ros_type), topic, QoSProfile(depth=depth, durability=durability)
+            )
+        self._service = self.create_service(Trigger, "~/reset", self._reset_asked)
+
+    def _stop(self) -> None:
+        for each in self._inputs:
+            each.close()
+        for timer in self._rate_timers:
+            self.destroy_timer(timer)
+        self._inputs, self._rate_timers = [], []
+        if self._estimator is not None:
+            self._reset()
+
+    def _tear_down(self) -> None:
+        self._stop()
+        for publisher in self._publishers_by_topic.values():
+            self.destroy_lifecycle_publisher(publisher)
+        if self._service is not None:
+            self.destroy_service(self._service)
+        self._publishers_by_topic, self._service = {}, None
+        self._estimator, self._output = None, None
+
+    # Parameters and time --------------------------------------------------------------------------------------------
+
+    def _value(self, name: str) -> Any:
+        return self.get_parameter(name).value
+
+    def _judge_parameters(self, parameters: Iterable[Parameter]) -> SetParametersResult:
+        reason = why_refused(parameters, configured=self._estimator is not None)
+        return SetParametersResult(successful=not reason, reason=reason)
+
+    def _use_parameters(self, parameters: Iterable[Parameter]) -> None:
+        if self._rate_timers:
+            self._start_timers()
+
+    def _start_timers(self) -> None:
+        """Start what happens at a rate. Only the prediction follows simulated time: people look on in their own."""
+        for timer in self._rate_timers:
+            self.destroy_timer(timer)
+        wall = Clock(clock_type=ClockType.STEADY_TIME)
+        actions: list[tuple[float, Callable[[], None], Clock]] = [
+            (self._value("publish_rate"), self._predict, self.get_clock()),
+            (self._value("marker_rate"), self._draw, wall),
+            (self._value("diagnostics_rate"), self._diagnose, wall),
+            (1.0 / FOLLOW_PERIOD, self._follow_publishers, wall),
+        ]
+        self._rate_timers = [
+            self.create_timer(1.0 / rate, action, clock=clock) for rate, action, clock in actions if rate > 0.0
+        ]
+
+    def _now(self) -> int:
+        return int(self.get_clock().now().nanoseconds)
+
+    def _time_jumped(self, jump: TimeJump) -> None:
+        if self._estimator is not None:
+            self.get_logger().warning(f"time jumped by {jump.delta.nanoseconds * 1e-9:.3g} s: the estimate starts anew")
+            self._reset()
+
+    # Measurements in, estimates out ---------------------------------------------------------------------------------
+
+    def _forget(self) -> None:
+        self._arrived = 0  # when the newest measurement came, ns of the node's clock
+        self._latest: Estimate | None = None
+        self._drawn: Estimate | None = None
+        self._health: Health | None = None
+
+    def _reset(self) -> None:
+        assert self._estimator is not None
+        self._estimator.reset()
+        self._forget()
+
+    def _reset_asked(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._reset()
+        response.success, response.message = True, "the estimate starts anew with the next measurements"
+        return response
+
+    def _receive(self, source: MeasurementSource, type_name: str, data: bytes) -> None:
+        estimator = self._estimator
+        assert estimator is not None
+        stamp, rejection = estimator.stamp, estimator.last_rejection
+        changed = take_in(estimator, source, type_name, data)
+        if estimator.last_rejection != rejection:
+            self.get_logger().warning(estimator.last_rejection, throttle_duration_sec=5.0)
+        if changed:
+            if estimator.stamp != stamp:
+                self._arrived = self._now()
+            self._publish_states(estimator.stamp)
+
+    def _predict(self) -> None:
+        """Publish what is predicted for now, where measurements stay away for longer than a period and are not LOST."""
+        estimator = self._estimator
+        assert estimator is not None
+        if estimator.ready and (self._now() - self._arrived) * 1e-9 * self._value("publish_rate") > 1.0:
+            stamp = self._present()
+            if self._watch_health().level is not Level.LOST:
+                self._publish_states(stamp)
+
+    def _present(self) -> int:
+        """Stamp, ns, that a measurement would have that came now."""
+        assert self._estimator is not None
+        if not self._estimator.ready:
+            return self._now()
+        return self._estimator.stamp + max(0, self._now() - self._arrived)
+
+    def _publish_states(self, stamp: int) -> None:
+        assert self._estimator is not None
+        assert self._output is not None
+        try:
+            estimate = self._estimator.estimate(stamp + round(self._value("prediction_horizon") * 1e9))
+            self._publish(self._output.states(estimate))
+        except PhysicsPriorError as error:
+            self.get_logger().error(f"{error}; the estimate starts anew")
+            self._reset()
+            return
+        self._latest = estimate
+        self._watch_health()
+
+    def _draw(self) -> None:
+        assert self._output is not None
+        if self._latest is not None and self._latest is not self._drawn:
+            self._drawn = self._latest
+            self._publish(self._output.markers(self._latest))
+
+    def _publish(self, publications: Iterable[Publication]) -> None:
+        for topic, message in publications:
+            self._publishers_by_topic[topic].publish(encode(message))
+
+    # Health ---------------------------------------------------------------------------------------------------------
+
+    def _follow_publishers(self) -> None:
+        for each in self._inputs:
+            each.follow()
+
+    def _watch_health(self) -> Health:
+        """Health now; a change of its level is logged with its cause."""
+        assert self._estimator is not None
+        health = self._estimator.health_at(self._present())
+        if self._health is None or health.level is not self._health.level:
+            log = self.get_logger().info if health.level is Level.OK else self.get_logger().warning
+            log(f"health {health.level.name}" + (f": {health.cause}" if health.cause else ""))
+        self._health = health
+        return health
+
+    def _diagnose(self) -> None:
+        assert self._estimator is not None
+        assert self._output is not None
+        health, problems = self._watch_health(), [each.problem for each in self._inputs if each.problem]
+        lost = sum(each.lost for each in self._inputs)
+        if lost > self._lost_before:
+            problems.append(
+                f"{lost - self._lost_before} measurements were lost: they come faster than they are taken in"
+            )
+        if problems:
+            causes = "; ".join([*problems, health.cause] if health.cause else problems)
+            health = Health(max(health.level, Level.DEGRADED), causes)
+        more = {
+            "measurements lost": lost,
+            "longest wait ms": f"{1e3 * max((each.longest_wait for each in self._inputs), default=0.0):.1f}",
+            "last rejection": self._estimator.last_rejection,
+        }
+        self._lost_before = lost
+        for each in self._inputs:
+            each.forget_wait()
+        self._publish(self._output.diagnostics(self._present(), health, self._estimator.counts, self._latest, more))
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM; return the exit code: 0, or 2 where what it was started with is not valid."""
+    node: PhysicsPriorNode | None = None
+    try:
+        rclpy.init(args=arguments)
+        node = PhysicsPriorNode()
+        if node.get_parameter(AUTOSTART).value:
+            node.start()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except PhysicsPriorError as error:
+        print(f"physics_prior_node: {error}", file=sys.stderr)
+        return 2
+    except RuntimeError as error:  # rclpy's own root, of errors in its arguments and of all calls after a shutdown
+        if node is not None and rclpy.ok():
+            raise
+        if node is None:
+            print(f"physics_prior_node: {' '.join(str(error).split())}", file=sys.stderr)
+            return 2
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -83,7 +83,7 @@ class Estimator:
         self._read += 1
         if not self.history:
             return self._begin(measurement)
-        if self.history.holds(measurement) or not self.history.reaches(measurement.stamp):
+        if self.history.holds(measurement) or not self.history.reaches(measurement):
             return self._set_aside(measurement)
         self._stale.clear()
         try:
@@ -198,7 +198,9 @@ class Estimator:
 
     def _set_aside(self, measurement: Measurement) -> bool:
         """Keep a measurement that finds no place; enough of them in a row mean that time has jumped back."""
-        self._stale.append(measurement)
+        newest = self.stamp or max(each.stamp for each in self._waiting)
+        if measurement.stamp < newest - START_WINDOW:  # merely late ones tell nothing about the clock
+            self._stale.append(measurement)
         if len(self._stale) >= JUMP_AFTER:
             again = self._stale
             self.reset()

@@ -49,9 +49,9 @@ class History:
         place = bisect_left(self._keys, self._key(measurement))
         return place < len(self._keys) and self._keys[place] == self._key(measurement)
 
-    def reaches(self, stamp: int) -> bool:
-        """Whether a measurement at this stamp still finds its place."""
-        return bool(self._keys) and stamp >= self._keys[0][0]
+    def reaches(self, measurement: Measurement) -> bool:
+        """Whether a measurement still finds its place: the oldest node is what all others are rolled from."""
+        return bool(self._keys) and self._key(measurement) > self._keys[0]
 
     def insert(self, measurement: Measurement) -> bool:
         """Put a measurement in its place and roll on from there; return whether it was late."""

@@ -46,10 +46,11 @@ def innovation(source: MeasurementSource, measurement: Measurement, simulator: S
         turn = rotations.log(
             rotations.quaternion_from_matrix(R.T @ rotations.matrix_from_quaternion(measurement.orientation))
         )
-        y = np.concatenate([measurement.position - position, turn])
+        y = np.concatenate([source.scale * measurement.position - position, turn])
         H = np.concatenate([jacobian[3:], R.T @ jacobian[:3]])
         if measurement.covariance is not None:
-            return Innovation(y, H, np.linalg.cholesky(measurement.covariance))
+            to_metres = np.repeat([source.scale, 1.0], 3)
+            return Innovation(y, H, to_metres[:, None] * np.linalg.cholesky(measurement.covariance))
         return Innovation(y, H, np.diag([source.position_noise] * 3 + [source.orientation_noise] * 3))
     if isinstance(source, OrientationSource) and isinstance(measurement, OrientationMeasurement):
         _, R, jacobian = _frame(simulator, source)

@@ -101,28 +101,37 @@ def replay(
     process: str = "physics",
     reference: str | None = None,
     publish_rate: float = 30.0,
+    until: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> ReplayResult:
     """Run a recording through a scene's estimator.
 
     out: a bag to write, with the topics of the node. smooth: estimate each stamp from the whole recording. reference: a
-    JointState topic to score against. publish_rate: Hz, of predictions where nothing is measured. progress: told the share
-    that is done.
+    JointState topic to score against. publish_rate: Hz, of predictions where nothing is measured. until: s after the bag's
+    first measurement, where to stop. progress: told the share that is done.
 
     Raises:
         RecordingError: the bag, a topic or the output is not usable; nothing is left half-written.
         SimulationError: the scene's motion cannot be computed.
     """
-    return _Replay(bag, scene, smooth, process, reference, publish_rate).run(out, progress)
+    return _Replay(bag, scene, smooth, process, reference, publish_rate, until).run(out, progress)
 
 
 class _Replay:
     """One run: the estimator, what it said, and where that goes."""
 
     def __init__(
-        self, bag: Path, scene: Scene, smoothed: bool, process: str, reference: str | None, publish_rate: float
+        self,
+        bag: Path,
+        scene: Scene,
+        smoothed: bool,
+        process: str,
+        reference: str | None,
+        publish_rate: float,
+        until: float | None,
     ) -> None:
         self.reader = open_bag(bag)
+        self.until = FOREVER if until is None else until
         self.scene, self.smoothed, self.period = scene, smoothed, 1.0 / publish_rate
         self.sources = _sources(self.reader, scene)
         self.reference = _read_reference(self.reader, reference) if reference is not None else None
@@ -163,6 +172,8 @@ class _Replay:
         self.first_log = self.last_log = 0
         for index, record in enumerate(self.reader.read(self.sources)):
             self.first_log = self.first_log or record.log_time_ns
+            if record.log_time_ns - self.first_log > self.until * NANOSECONDS:
+                break
             self.last_log = max(self.last_log, record.log_time_ns)
             if progress is not None and index % 100 == 0:
                 progress(index / total)

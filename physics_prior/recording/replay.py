@@ -43,7 +43,8 @@ class ReplayResult:
 
     Attributes:
         scene: what was estimated; smoothed: by all measurements or only by past ones.
-        stamps: (k,) seconds after the first estimate.
+        epoch: stamp of the first estimate, ns; all other times count from it.
+        stamps: (k,) seconds.
         readouts, deviations: readout name -> (k,) or (k, 3); values and standard deviations; units by name.
         health: (k,) Level.
         reference_stamps, reference: (r,) seconds, and name -> (r,), where there is one.
@@ -56,6 +57,7 @@ class ReplayResult:
 
     scene: Scene
     smoothed: bool
+    epoch: int = 0
     counts: Counts = field(default_factory=Counts)
     loss: str | None = None
     stamps: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -266,6 +268,7 @@ class _Replay:
                 f" '{self.scene.name}' ({self.estimator.last_rejection or 'too few of them agree'})"
             )
         stamps = np.array([row[0] for row in self.rows], dtype=np.int64)
+        result.epoch = self.first_stamp
         result.stamps = (stamps - self.first_stamp) / NANOSECONDS
         result.health = np.array([row[1] for row in self.rows])
         for readout in self.scene.readouts:

@@ -1,0 +1,189 @@
+"""Simulated recordings: a scene's own motion, what its sources would measure of it, and the truth beside them."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+
+from physics_prior import rotations
+from physics_prior.dynamics.simulator import Simulator
+from physics_prior.errors import SimulationError
+from physics_prior.estimation.measurement import (
+    JointsMeasurement,
+    Measurement,
+    OrientationMeasurement,
+    PointsMeasurement,
+    PoseMeasurement,
+)
+from physics_prior.estimation.process import steps
+from physics_prior.interface.geometry import NANOSECONDS, header_of, point_of, pose_of
+from physics_prior.recording.definitions import message_class
+from physics_prior.recording.messages import JointState, Pose, PoseArray, PoseStamped
+from physics_prior.recording.truth import Truth
+from physics_prior.recording.wire import Message
+from physics_prior.recording.writer import BagWriter
+from physics_prior.scene import JointSource, MeasurementSource, OrientationSource, PointsSource, PoseSource, Scene
+
+EPOCH = 1_700_000_000 * NANOSECONDS  # stamp of the start, ns: always the same, so that recordings are
+MAXIMUM_MEASUREMENTS = 10_000_000  # times sources: a slip of the finger in the duration fills no disk
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """The true state, q (nq,) and v (nv,), at a stamp, ns, and what the sources measure of it, in their order."""
+
+    stamp: int
+    q: np.ndarray
+    v: np.ndarray
+    measurements: list[Measurement]
+
+
+def motion(
+    scene: Scene, simulator: Simulator, seed: int | None = None, duration: float | None = None
+) -> Iterator[Moment]:
+    """The motion of a scene from its initial state, at its rate of measurements, the start and the end included.
+
+    An unknown force pushes as the scene's noise says, one value a step: its standard deviation is the density over sqrt(h).
+    All noise comes from PCG64 streams spawned from the seed, the force's own and one a source, so that what one of them
+    draws does not depend on the others. seed and duration [s] are the scene's where left out.
+
+    Raises:
+        SimulationError: a seed or duration that is not valid; initial values that cannot be put onto the constraints; a
+            motion that leaves the numbers.
+    """
+    seed = scene.simulation.seed if seed is None else seed
+    duration = scene.simulation.duration if duration is None else duration
+    count = _count(scene, seed, duration)
+    streams = np.random.SeedSequence(seed).spawn(1 + len(scene.measurements))
+    force_noise, *noises = (np.random.Generator(np.random.PCG64(stream)) for stream in streams)
+    q, v = scene.initial.q.copy(), scene.initial.v.copy()
+    left = simulator.project(q, v)
+    if not left <= 1e-9:
+        raise SimulationError(
+            f"the scene's initial positions are {left:.3g} m off the constraints and cannot be put onto them:"
+            " give some that are nearer"
+        )
+    stamp = EPOCH
+    for k in range(count + 1):
+        measurements = []
+        simulator.move(q, v)
+        for source, noise in zip(scene.measurements, noises, strict=True):
+            measurements.append(_measure(source, simulator, q, stamp, noise))
+        yield Moment(stamp, q.copy(), v.copy(), measurements)
+        following = EPOCH + round((k + 1) * NANOSECONDS / scene.simulation.rate)
+        inner, h = steps((following - stamp) * 1e-9, scene.step.size)
+        for _ in range(inner if k < count else 0):
+            tau = scene.noise.force * force_noise.normal(size=simulator.nv) / math.sqrt(h)
+            simulator.advance(q, v, h, tau=tau if scene.simulation.force_noise else None)
+        stamp = following
+
+
+def simulate(
+    scene: Scene,
+    out: Path,
+    seed: int | None = None,
+    duration: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> None:
+    """Record a simulated motion as a bag: each source on its own topic, the truth beside it on /truth/... topics.
+
+    The same scene, seed and duration give the same bytes on the same machine with the same versions of the libraries. Other
+    processors may round the motion differently in its last bits. progress is told the share that is done.
+
+    Raises:
+        RecordingError: the bag exists or cannot be written; SimulationError: as ``motion``. Nothing is left half-written.
+    """
+    seed = scene.simulation.seed if seed is None else seed
+    duration = scene.simulation.duration if duration is None else duration
+    _count(scene, seed, duration)
+    simulator = Simulator(scene.tree, scene.effects, scene.step.integrator)
+    truth = Truth(scene, simulator)
+    with BagWriter(out) as writer:
+        for source in scene.measurements:
+            writer.add_topic(source.topic, message_class(source.message_types[0]))
+        for topic, message_type in truth.topics.items():
+            writer.add_topic(topic, message_type)
+        writer.add_metadata(
+            "simulation",
+            {
+                "scene": scene.name,
+                "seed": str(seed),
+                "duration_s": repr(float(duration)),
+                "rate_hz": repr(float(scene.simulation.rate)),
+                "version": _version(),
+            },
+        )
+        for moment in motion(scene, simulator, seed, duration):
+            for measurement in moment.measurements:
+                writer.write(measurement.topic, message_of(measurement, scene.frame_id), moment.stamp)
+            for topic, message in truth.messages(moment.stamp, moment.q, moment.v):
+                writer.write(topic, message, moment.stamp)
+            if progress is not None:
+                progress(min(1.0, (moment.stamp - EPOCH) / NANOSECONDS / duration))
+
+
+def message_of(measurement: Measurement, frame_id: str) -> Message:
+    """The message that brings a measurement: PoseStamped, PoseArray or JointState, without a covariance."""
+    header = header_of(measurement.stamp, frame_id)
+    if isinstance(measurement, PoseMeasurement):
+        return PoseStamped(header, pose_of(measurement.position, measurement.orientation))
+    if isinstance(measurement, OrientationMeasurement):
+        return PoseStamped(header, pose_of(np.zeros(3), measurement.orientation))
+    if isinstance(measurement, PointsMeasurement):
+        return PoseArray(header, [Pose(point_of(point)) for point in measurement.points])
+    assert isinstance(measurement, JointsMeasurement)
+    return JointState(header, measurement.names, measurement.positions)
+
+
+def _count(scene: Scene, seed: int, duration: float) -> int:
+    """How many intervals of measurement fill the duration."""
+    if seed < 0:
+        raise SimulationError(f"seed {seed} is not valid: give a whole number >= 0")
+    if not 0.0 < duration < math.inf:
+        raise SimulationError(f"duration {duration:g} s is not valid: give a positive number")
+    count = math.floor(duration * scene.simulation.rate + 1e-9)
+    if count * max(1, len(scene.measurements)) > MAXIMUM_MEASUREMENTS:
+        longest = MAXIMUM_MEASUREMENTS / max(1, len(scene.measurements)) / scene.simulation.rate
+        raise SimulationError(f"duration {duration:g} s is too long: at the scene's rate, give at most {longest:g} s")
+    return count
+
+
+def _measure(
+    source: MeasurementSource, simulator: Simulator, q: np.ndarray, stamp: int, noise: np.random.Generator
+) -> Measurement:
+    """What a source measures of a configuration; needs ``move``.
+
+    Noise is white: of positions in world axes, of rotations as a rotation vector in the measured frame's axes.
+    """
+    if isinstance(source, PoseSource | OrientationSource):
+        position, R = simulator.pose(source.part)
+        position = position + R @ np.array(source.frame.position)
+        orientation = rotations.multiply(rotations.quaternion_from_matrix(R), np.array(source.frame.orientation))
+        if isinstance(source, PoseSource):
+            position = (position + source.position_noise * noise.normal(size=3)) / source.scale
+        turned = rotations.multiply(orientation, rotations.exp(source.orientation_noise * noise.normal(size=3)))
+        if isinstance(source, OrientationSource):
+            return OrientationMeasurement(stamp, source.topic, turned)
+        return PoseMeasurement(stamp, source.topic, position, turned)
+    if isinstance(source, PointsSource):
+        points = []
+        for marker in source.markers:
+            position, R = simulator.pose(marker.part)
+            points.append(position + R @ np.array(marker.point) + source.noise * noise.normal(size=3))
+        return PointsMeasurement(stamp, source.topic, np.array(points))
+    assert isinstance(source, JointSource)
+    true = np.array([q[simulator.tree.link(joint).q.start] for joint in source.joints.values()])
+    return JointsMeasurement(
+        stamp, source.topic, tuple(source.joints), true + source.noise * noise.normal(size=len(true))
+    )
+
+
+def _version() -> str:
+    """The version of this program, or that it is not installed."""
+    try:
+        return version("physics_prior")
+    except PackageNotFoundError:
+        return "not installed"

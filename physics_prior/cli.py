@@ -25,7 +25,7 @@ COMMANDS = {
 DONE, BAD_INPUT, INTERRUPTED = 0, 2, 130
 
 EPILOG = """\
-examples:
+Examples:
   physics-prior check double_pendulum
   physics-prior simulate double_pendulum -o my_bag --seed 1
   physics-prior replay my_bag --scene double_pendulum --reference /truth/joint_states --plot my_bag.png

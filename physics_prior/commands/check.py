@@ -4,7 +4,7 @@ Prints the parts and joints of the model, the effects and why each is on, constr
 state, what is measured, read out and published, and what one step costs on this machine. Only the effects that are listed
 are compiled into the step; --show-step prints its source.
 
-examples:
+Examples:
   physics-prior check four_bar
   physics-prior check my_scene.yaml
   physics-prior check four_bar --show-step

@@ -2,7 +2,7 @@
 
 The bag is laid out as rosbag2 does it. The same scene, seed and duration give the same bag, bit for bit.
 
-examples:
+Examples:
   physics-prior simulate double_pendulum -o my_bag
   physics-prior simulate my_scene.yaml -o my_bag --seed 7 --duration 30
 """
@@ -17,7 +17,9 @@ from physics_prior.commands.terminal import progress
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the arguments of `simulate`."""
     parser.add_argument("scene", metavar="SCENE", help="a scene file, or the name of a shipped scene")
-    parser.add_argument("-o", "--output", metavar="BAG", type=Path, required=True, help="the bag to write; a new folder")
+    parser.add_argument(
+        "-o", "--output", metavar="BAG", type=Path, required=True, help="the bag to write; a new folder"
+    )
     parser.add_argument("--seed", type=_seed, help="of all noise; the scene's where left out")
     parser.add_argument("--duration", type=_seconds, help="in seconds; the scene's where left out")
 

@@ -1,0 +1,71 @@
+"""Estimate motion and constraint forces from a recording, as fast as it goes and without ROS.
+
+The bag is a rosbag2 folder or a bare .mcap file; the scene says which topics are read. Prints what became of the
+measurements, whether the filter's own uncertainty holds (NIS), its health and, with --reference, its errors from 0.2 s on.
+The same recording gives the same numbers as the live node, bit for bit.
+
+Examples:
+  physics-prior replay my_bag --scene double_pendulum
+  physics-prior replay my_bag --scene double_pendulum --smooth -o estimates --plot estimates.png
+  physics-prior replay my_bag --scene my_scene.yaml --reference /truth/joint_states --json -
+"""
+
+import argparse
+from pathlib import Path
+
+from physics_prior.commands.terminal import STDOUT, progress, require_folder, whole_file, write_json
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the arguments of `replay`."""
+    parser.add_argument("bag", metavar="BAG", type=Path, help="the recording: a rosbag2 folder or an .mcap file")
+    parser.add_argument("--scene", required=True, help="a scene file, or the name of a shipped scene")
+    parser.add_argument(
+        "-o", "--output", metavar="OUTBAG", type=Path, help="a bag to write, with the topics that the node publishes"
+    )
+    parser.add_argument("--smooth", action="store_true", help="estimate every moment from the whole recording")
+    parser.add_argument(
+        "--process",
+        choices=("physics", "kinematic"),
+        default="physics",
+        help="what carries the state on between measurements: the scene's physics, or constant acceleration without"
+        " any, to see what physics buys",
+    )
+    parser.add_argument("--reference", metavar="TOPIC", help="a JointState topic of the bag to compare with")
+    parser.add_argument("--plot", metavar="FILE", help="draw the estimates: .png, .svg or .pdf")
+    parser.add_argument("--json", metavar="FILE", help="write the figures as JSON; - prints that and nothing else")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Replay the bag; 0."""
+    require_folder("--json", args.json)
+    require_folder("--plot", args.plot)
+    from physics_prior.commands.compilation import compiled
+    from physics_prior.commands.replay_report import print_report
+    from physics_prior.recording.replay import replay
+    from physics_prior.scene import load_scene
+
+    if args.plot is not None:
+        from physics_prior.studies.plot import plot_replay, require_format
+
+        require_format(Path(args.plot))
+    scene = load_scene(args.scene)
+    compiled(scene)
+    with progress(f"replaying {args.bag.name}") as report:
+        result = replay(
+            args.bag,
+            scene,
+            out=args.output,
+            smooth=args.smooth,
+            process=args.process,
+            reference=args.reference,
+            progress=report,
+        )
+    if args.plot is not None:
+        with whole_file(Path(args.plot)) as partial:
+            plot_replay(result, partial)
+    if args.json is not None:
+        write_json(args.json, result.summary())
+    if args.json != STDOUT:
+        print_report(result, [str(file) for file in (args.output, args.plot, args.json) if file is not None])
+    return 0

@@ -1,0 +1,83 @@
+"""What a replay found, in tables."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from physics_prior.commands.terminal import console, table
+from physics_prior.recording.replay import ReplayResult
+
+MOST_HEALTH = 1e-3  # s, of a health that is worth a word
+
+
+def print_report(result: ReplayResult, written: Sequence[str]) -> None:
+    """Print figures and readouts of a replay, and which files hold more."""
+    out = console()
+    if result.loss is not None:
+        out.print(f"salvaged: {result.loss}", style="bold yellow")
+    figures = result.summary()
+    out.print(_figures(result, figures))
+    if result.readouts:
+        out.print()
+        out.print(_readouts(result))
+    if written:
+        out.print(f"\nwritten: {', '.join(written)}")
+
+
+def _figures(result: ReplayResult, figures: dict[str, Any]) -> Table:
+    kind = "smoothed by the whole recording" if result.smoothed else "causal"
+    out = table(f"{result.scene.name}, {kind}", "", "")
+    counts = figures["measurements"]
+    out.add_row("measurements", ", ".join(f"{counts[key]} {key}" for key in counts))
+    factor = figures["realtime_factor"]
+    speed = f", {factor:.3g}x real time" if factor is not None else ""
+    out.add_row("recording", f"{figures['span_s']:.2f} s, replayed in {figures['wall_s']:.2f} s{speed}")
+    out.add_row("NIS", _nis(figures["nis"]))
+    spans = [f"{level} {seconds:.2f} s" for level, seconds in figures["health"].items() if seconds > MOST_HEALTH]
+    out.add_row("health", ", ".join(spans))
+    score = figures["reference"]
+    for key, what in SCORES.items():
+        if score is not None and score.get(key) is not None:
+            out.add_row(f"RMSE of {what[0]}", f"{score[key]:.3g} {what[1]}, from {score['from_s']:g} s on")
+    return out
+
+
+SCORES = {
+    "position_rmse_deg": ("angles", "deg"),
+    "position_rmse_m": ("lengths", "m"),
+    "velocity_rmse": ("rates", "rad/s or m/s"),
+    "force_rmse_percent_weight": ("forces", "% of weight"),
+}
+"""Figures against a reference: what they are and in which unit."""
+
+
+def _nis(nis: dict[str, Any]) -> str:
+    """The normalised innovation squared, with a verdict."""
+    if nis["mean"] is None:
+        return "no measurement was used"
+    low, high = nis["band95"]
+    verdict = "in"
+    if not low <= nis["mean"] <= high:
+        verdict = "below" if nis["mean"] < low else "above"
+    return (
+        f"mean {nis['mean']:.3f}, expected {nis['expected']:.3f}: {verdict} its 95 % band [{low:.3f}, {high:.3f}]"
+        + ("" if verdict == "in" else "; the noise stated is too " + ("large" if verdict == "below" else "small"))
+    )
+
+
+def _readouts(result: ReplayResult) -> Table:
+    out = table("readouts", "name", "unit", "least", "most", "last", "standard deviation, median", numbers=4)
+    for name, values in result.readouts.items():
+        columns, spread = (each.reshape(len(each), -1) for each in (values, result.deviations[name]))
+        for index, column in enumerate(columns.T):
+            label = f"{name}/{'xyz'[index]}" if columns.shape[1] == 3 else name
+            shown = (column.min(), column.max(), column[-1], np.median(spread[:, index]))
+            out.add_row(label, result.units[name], *(f"{_plain(number):.4g}" for number in shown))
+    return out
+
+
+def _plain(number: float) -> float:
+    """Rounding errors as the zero that they are."""
+    return float(number) if abs(number) > 1e-9 else 0.0

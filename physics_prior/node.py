@@ -2,6 +2,7 @@
 
 import sys
 import time
+import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
@@ -26,6 +27,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
+from physics_prior.dynamics.kernel import cache_directory
 from physics_prior.estimation.estimate import Estimate, Health, Level
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.interface import Output, take_in
@@ -59,7 +61,6 @@ class PhysicsPriorNode(LifecycleNode):
         self._inputs: list[Input] = []
         self._rate_timers: list[Any] = []
         self._service: Any = None
-        self._failure: Exception | None = None
         self._lost_before = 0
         self._forget()
         self.add_on_set_parameters_callback(self._judge_parameters)
@@ -70,20 +71,18 @@ class PhysicsPriorNode(LifecycleNode):
 
     # Lifecycle ------------------------------------------------------------------------------------------------------
 
-    def start(self) -> None:
-        """Configure and activate. Raises what made that fail."""
-        for transition in (self.trigger_configure, self.trigger_activate):
-            if transition() is not TransitionCallbackReturn.SUCCESS:
-                raise self._failure or PhysicsPriorError("the node could not be activated: its log says why")
+    def start(self) -> bool:
+        """Configure and activate; return whether that went well. What did not is in the log."""
+        transitions = (self.trigger_configure, self.trigger_activate)
+        return all(transition() is TransitionCallbackReturn.SUCCESS for transition in transitions)
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         try:
             self._configure()
-        except Exception as error:  # rclpy would swallow it without a word
-            self._failure = error
-            self.get_logger().error(str(error) or repr(error))
-            self._tear_down()
-            return TransitionCallbackReturn.FAILURE
+        except PhysicsPriorError as error:
+            return self._give_up(str(error))
+        except Exception:  # rclpy would swallow it without a word
+            return self._give_up(traceback.format_exc())
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -119,8 +118,15 @@ class PhysicsPriorNode(LifecycleNode):
         self._jump_handle.unregister()
         super().destroy_node()
 
+    def _give_up(self, reason: str) -> TransitionCallbackReturn:
+        self.get_logger().error(reason)
+        self._tear_down()
+        return TransitionCallbackReturn.FAILURE
+
     def _configure(self) -> None:
         scene = load_scene(require_scene(self._value("scene")))
+        if not cache_directory().exists():
+            self.get_logger().info("compiling, once: the next start takes a second")
         scene = replace(scene, frame_id=self._value("frame_id") or scene.frame_id)
         warm_up(scene)
         self._estimator = Estimator(scene, history_length=self._value("history_length"))
@@ -302,8 +308,8 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         rclpy.init(args=arguments)
         node = PhysicsPriorNode()
-        if node.get_parameter(AUTOSTART).value:
-            node.start()
+        if node.get_parameter(AUTOSTART).value and not node.start() and rclpy.ok():
+            return 2
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         executor.spin()
@@ -316,7 +322,8 @@ def main(arguments: list[str] | None = None) -> int:
         if node is not None and rclpy.ok():
             raise
         if node is None:
-            print(f"physics_prior_node: {' '.join(str(error).split())}", file=sys.stderr)
+            sentence = str(error).partition(", at /")[0]  # the rest is where rcl's sources stood when it was built
+            print(f"physics_prior_node: {sentence}", file=sys.stderr)
             return 2
     finally:
         if node is not None:

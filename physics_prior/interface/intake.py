@@ -17,7 +17,6 @@ from physics_prior.recording.cdr import decode
 from physics_prior.recording.messages import (
     Header,
     JointState,
-    Pose,
     PoseArray,
     PoseStamped,
     PoseWithCovarianceStamped,
@@ -25,7 +24,7 @@ from physics_prior.recording.messages import (
 from physics_prior.recording.wire import Message
 from physics_prior.scene import JointSource, MeasurementSource, OrientationSource, PointsSource, PoseSource, Scene
 
-ROTATION = slice(3, 6)  # rows and columns of a 6x6 covariance
+ALL, ROTATION = slice(0, 6), slice(3, 6)  # rows and columns of a 6x6 covariance
 SHOWN_NAMES = 8  # of a message's joints, in a sentence
 
 
@@ -67,11 +66,11 @@ def _translate(source: MeasurementSource, message: Message, frame_id: str) -> Me
         message, PoseStamped | PoseWithCovarianceStamped
     ):
         stamp = _stamp_in(message.header, frame_id)
-        pose, covariance = _pose_and_covariance(message)
-        if isinstance(source, PoseSource):
-            return PoseMeasurement(stamp, topic, array_of(pose.position), wxyz_of(pose.orientation), covariance)
-        turning = covariance if covariance is None else covariance[ROTATION, ROTATION]
-        return OrientationMeasurement(stamp, topic, wxyz_of(pose.orientation), turning)
+        pose = message.pose if isinstance(message, PoseStamped) else message.pose.pose
+        wxyz = wxyz_of(pose.orientation)
+        if isinstance(source, OrientationSource):
+            return OrientationMeasurement(stamp, topic, wxyz, _covariance(message, ROTATION))
+        return PoseMeasurement(stamp, topic, array_of(pose.position), wxyz, _covariance(message, ALL))
     if isinstance(source, PointsSource) and isinstance(message, PoseArray):
         count, expected = len(message.poses), len(source.markers)
         if count != expected:
@@ -103,22 +102,23 @@ def _stamp_in(header: Header, frame_id: str) -> int:
     return _stamp(header)
 
 
-def _pose_and_covariance(message: PoseStamped | PoseWithCovarianceStamped) -> tuple[Pose, np.ndarray | None]:
-    """Return the pose and the covariance (6, 6), its rotation about the measured axes; None where the message has none.
+def _covariance(message: PoseStamped | PoseWithCovarianceStamped, rows: slice) -> np.ndarray | None:
+    """Return some rows and columns of a covariance, its rotation about the measured axes; None where there is none.
 
     The message counts rotation about the fixed axes of its frame, R -> exp(d) R, a measurement about the measured frame's
     own, R -> R exp(d'): d' = R^T d. All zeros say that the covariance is unknown: the scene's noise holds.
     """
     if isinstance(message, PoseStamped):
-        return message.pose, None
-    pose = message.pose.pose
-    covariance = np.reshape(message.pose.covariance, (6, 6))
+        return None
+    covariance = np.reshape(message.pose.covariance, (6, 6))[rows, rows]
     if not covariance.any():
-        return pose, None
-    quaternion = PoseMeasurement(0, "", np.zeros(3), wxyz_of(pose.orientation)).orientation
+        return None
+    quaternion = OrientationMeasurement(0, "", wxyz_of(message.pose.pose.orientation)).orientation
     T = np.eye(6)
     T[ROTATION, ROTATION] = rotations.matrix_from_quaternion(quaternion).T
-    return pose, T @ covariance @ T.T
+    T = T[rows, rows]
+    with np.errstate(invalid="ignore", over="ignore"):  # the measurement refuses what is not finite
+        return T @ covariance @ T.T
 
 
 def _known_joints(source: JointSource, message: JointState) -> tuple[tuple[str, ...], np.ndarray]:

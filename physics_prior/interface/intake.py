@@ -118,7 +118,7 @@ def _covariance(message: PoseStamped | PoseWithCovarianceStamped, rows: slice) -
     T[ROTATION, ROTATION] = rotations.matrix_from_quaternion(quaternion).T
     T = T[rows, rows]
     with np.errstate(invalid="ignore", over="ignore"):  # the measurement refuses what is not finite
-        return T @ covariance @ T.T
+        return np.asarray(T @ covariance @ T.T)
 
 
 def _known_joints(source: JointSource, message: JointState) -> tuple[tuple[str, ...], np.ndarray]:

@@ -4,6 +4,7 @@ from physics_prior.dynamics.algebra import (
     IDENTITY,
     ZERO,
     cross,
+    dot,
     get3,
     get6,
     get9,
@@ -124,3 +125,17 @@ def point_jacobian(links, work, link_index, point, jacobian):
             put3(jacobian[0:3, link.v + c], turn)
             put3(jacobian[3:6, link.v + c], plus(shift, cross(turn, lever)))
         i = link.parent
+
+
+@kernel
+def energy(links, work, gravity):
+    """Kinetic energy plus potential energy in the uniform field gravity (3,), J, zero at the world's origin."""
+    total = 0.0
+    for i in range(links.shape[0]):
+        here, mass = work[i], links[i].mass
+        omega, center = get3(here.omega), get3(here.center)
+        velocity = plus(get3(here.velocity), cross(omega, center))
+        total += 0.5 * mass * dot(velocity, velocity)
+        total += 0.5 * dot(omega, symmetric_times(get6(here.inertia), omega))
+        total -= mass * dot((gravity[0], gravity[1], gravity[2]), plus(get3(here.origin), center))
+    return total

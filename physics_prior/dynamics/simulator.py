@@ -62,6 +62,8 @@ class Simulator:
         self.rank = 0
         self._links, self._pairs = link_records(tree), pair_records(tree, pairs)
         self._work = np.zeros(len(self._links), dtype=WORK)
+        self._rotations, self._origins = self._work["rotation"].reshape(-1, 3, 3), self._work["origin"]
+        self._frames: dict[str, tuple[int, np.ndarray, np.ndarray]] = {}
         self._rows = np.zeros((self.rows, 2 * self.nv + 2 * self.rows + 3))
         self._parameters = pack_parameters(tree, effects)
         self._module = step_module(effects, bool(pairs), integrator)
@@ -162,34 +164,25 @@ class Simulator:
 
     def pose(self, part: str) -> tuple[np.ndarray, np.ndarray]:
         """Position (3,) m and rotation matrix (3, 3), part to world, of a part's frame; needs ``move``."""
-        frame = self.tree.frame(part)
-        own = rotations.matrix_from_quaternion(frame.orientation)
-        if frame.link < 0:
-            return frame.position.copy(), own
-        here = self._work[frame.link]
-        R = here["rotation"].reshape(3, 3)
-        return here["origin"] + R @ frame.position, R @ own
+        link, position, own = self._frame(part)
+        if link < 0:
+            return position.copy(), own.copy()
+        R = self._rotations[link]
+        return self._origins[link] + R @ position, R @ own
 
     def velocity(self, part: str) -> tuple[np.ndarray, np.ndarray]:
         """Linear and angular velocity, (3,) m/s and (3,) rad/s, world axes, of a part's frame; needs ``move``."""
-        frame = self.tree.frame(part)
-        if frame.link < 0:
+        link, position, _ = self._frame(part)
+        if link < 0:
             return np.zeros(3), np.zeros(3)
-        here = self._work[frame.link]
-        lever = here["rotation"].reshape(3, 3) @ frame.position
-        return here["velocity"] + np.cross(here["omega"], lever), here["omega"].copy()
+        here = self._work[link]
+        return here["velocity"] + np.cross(here["omega"], self._rotations[link] @ position), here["omega"].copy()
 
     def jacobian(self, part: str, point: np.ndarray) -> np.ndarray:
         """(6, nv): angular velocity of a part and velocity of a point in its frame (3,), world axes, per v; needs ``move``."""
-        frame = self.tree.frame(part)
+        link, position, own = self._frame(part)
         out = np.zeros((6, self.nv))
-        kinematics.point_jacobian(
-            self._links,
-            self._work,
-            frame.link,
-            frame.position + rotations.matrix_from_quaternion(frame.orientation) @ point,
-            out,
-        )
+        kinematics.point_jacobian(self._links, self._work, link, position + own @ point, out)
         return out
 
     def mass_matrix(self, q: np.ndarray) -> np.ndarray:
@@ -208,15 +201,15 @@ class Simulator:
 
     def energy(self) -> float:
         """Kinetic energy plus potential energy in the uniform field, J, zero height at the world's origin; needs ``move``."""
-        total = 0.0
-        for link, here in zip(self._links, self._work, strict=True):
-            center = here["origin"] + here["center"]
-            rate = here["velocity"] + np.cross(here["omega"], here["center"])
-            xx, xy, xz, yy, yz, zz = here["inertia"]
-            inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-            total += 0.5 * link["mass"] * (rate @ rate) + 0.5 * here["omega"] @ inertia @ here["omega"]
-            total -= link["mass"] * (self._parameters[:GRAVITY] @ center)
-        return float(total)
+        return float(kinematics.energy(self._links, self._work, self._parameters[:GRAVITY]))
+
+    def _frame(self, part: str) -> tuple[int, np.ndarray, np.ndarray]:
+        """Link, position and rotation on it of a part; ModelError lists the known parts."""
+        if part not in self._frames:
+            frame = self.tree.frame(part)
+            R = rotations.matrix_from_quaternion(frame.orientation)
+            self._frames[part] = (frame.link, frame.position, R)
+        return self._frames[part]
 
     def wrench_array(self, q: np.ndarray, v: np.ndarray, vdot: np.ndarray | None = None) -> np.ndarray:
         """(len(wrench_names), 6): force and moment ON a part BY each joint and constraint effect, world axes.

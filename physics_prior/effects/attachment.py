@@ -8,6 +8,7 @@ from pydantic import Field
 
 from physics_prior import rotations
 from physics_prior.effects.effect import Anchor, Effect, PointPair
+from physics_prior.errors import ModelError
 from physics_prior.model import Tree
 
 Vector = tuple[float, float, float]
@@ -22,8 +23,10 @@ class PinnedEffect(Effect):
     at: Vector = Field(default=(0.0, 0.0, 0.0), description="m, in the frame of `to`")
 
     def check(self, tree: Tree) -> None:
-        tree.frame(self.part)
-        tree.frame(self.to)
+        if tree.frame(self.part).link == tree.frame(self.to).link:
+            raise ModelError(
+                f"'{self.part}' and '{self.to}' are one rigid body: hold a part by another that can move away"
+            )
 
     def anchors(self) -> tuple[Anchor, Anchor]:
         """The holding point a and the held point b."""
@@ -74,9 +77,7 @@ class Hinge(PinnedEffect):
         along_a, along_b = _unit(self.to_axis), _unit(self.axis)
         lever = _lever(tree)
         across = _across(along_a)
-        second = PointPair(
-            Anchor(a.part, a.point + lever * along_a), Anchor(b.part, b.point + lever * along_b), across
-        )
+        second = PointPair(Anchor(a.part, a.point + lever * along_a), Anchor(b.part, b.point + lever * along_b), across)
         return (PointPair(a, b, np.eye(3)), second)
 
 
@@ -99,7 +100,11 @@ class Weld(PinnedEffect):
         x, y, z = np.eye(3)
         return (
             PointPair(a, b, np.eye(3)),
-            PointPair(Anchor(a.part, a.point + lever * x), Anchor(b.part, b.point + lever * R.T @ x), np.array([y, z])),
+            PointPair(
+                Anchor(a.part, a.point + lever * x),
+                Anchor(b.part, b.point + lever * R.T @ x),
+                np.array([y, z]),
+            ),
             PointPair(Anchor(a.part, a.point + lever * y), Anchor(b.part, b.point + lever * R.T @ y), np.array([z])),
         )
 
@@ -118,5 +123,9 @@ def _across(axis: np.ndarray) -> np.ndarray:
 
 def _lever(tree: Tree) -> float:
     """A length typical of the model, m: rows at this lever weigh turning like shifting in the constraint solve."""
-    radii = [np.sqrt(np.trace(k.mass_properties.inertia) / k.mass_properties.mass) for k in tree.links if k.mass_properties.mass]
+    radii = [
+        np.sqrt(np.trace(k.mass_properties.inertia) / k.mass_properties.mass)
+        for k in tree.links
+        if k.mass_properties.mass
+    ]
     return float(max(np.max(radii), 1e-6)) if radii else 1.0

@@ -38,7 +38,9 @@ class JointDamping(Effect):
     def check(self, tree: Tree) -> None:
         for joint in self.coefficients:
             if tree.link(joint).joint.kind is JointKind.FREE:
-                raise ModelError(f"joint '{joint}' is free: joint damping acts in revolute, prismatic and spherical joints")
+                raise ModelError(
+                    f"joint '{joint}' is free: joint damping acts in revolute, prismatic and spherical joints"
+                )
 
     def explain(self, tree: Tree) -> str:
         return "joints resist their velocity: " + ", ".join(f"{j} {c:.3g}" for j, c in self.coefficients.items())

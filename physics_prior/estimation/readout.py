@@ -1,6 +1,8 @@
 """Readouts: the named scalars that a scene asks for, at a state, with their rates and uncertainties."""
 
+import math
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 
@@ -110,7 +112,14 @@ def _is_angle(readouts: Sequence[Readout], name: str) -> bool:
 
 def _angle(readout: AngleReadout, R: np.ndarray) -> float:
     """The angle about the world axis from the world's direction zero to the part's, both seen along the axis."""
+    zero, first, side = _angle_axes(readout)
+    turned = R @ zero
+    return math.atan2(side @ turned, first @ turned)
+
+
+@cache
+def _angle_axes(readout: AngleReadout) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The direction zero, its part across the axis, and the direction a quarter turn further."""
     axis, zero = np.array(readout.axis), np.array(readout.zero)
     first = zero - axis * (axis @ zero)
-    turned = R @ zero
-    return float(np.arctan2(axis @ np.cross(first, turned), first @ turned))
+    return zero, first, np.cross(axis, first)

@@ -19,8 +19,20 @@ class JointKind(IntEnum):
     FREE = 4
 
 
-COORDINATES = {JointKind.FIXED: 0, JointKind.REVOLUTE: 1, JointKind.PRISMATIC: 1, JointKind.SPHERICAL: 4, JointKind.FREE: 7}
-FREEDOMS = {JointKind.FIXED: 0, JointKind.REVOLUTE: 1, JointKind.PRISMATIC: 1, JointKind.SPHERICAL: 3, JointKind.FREE: 6}
+COORDINATES = {
+    JointKind.FIXED: 0,
+    JointKind.REVOLUTE: 1,
+    JointKind.PRISMATIC: 1,
+    JointKind.SPHERICAL: 4,
+    JointKind.FREE: 7,
+}
+FREEDOMS = {
+    JointKind.FIXED: 0,
+    JointKind.REVOLUTE: 1,
+    JointKind.PRISMATIC: 1,
+    JointKind.SPHERICAL: 3,
+    JointKind.FREE: 6,
+}
 
 
 @dataclass(frozen=True)
@@ -43,7 +55,8 @@ class Joint:
         axis: (3,) unit vector in the child frame; of use to revolute and prismatic joints only.
 
     Raises:
-        ModelError: a zero or non-finite axis, quaternion or position; a free joint not on the world.
+        ModelError: a zero or non-finite axis, quaternion or position; a free joint that is not on the world or is given a
+            position or orientation, which its q holds.
     """
 
     name: str
@@ -58,15 +71,24 @@ class Joint:
         position = np.asarray(self.position, dtype=float)
         axis = np.asarray(self.axis, dtype=float)
         if position.shape != (3,) or not np.all(np.isfinite(position)):
-            raise ModelError(f"joint '{self.name}': position {self.position} is not valid: give three finite numbers [m]")
+            raise ModelError(
+                f"joint '{self.name}': position {self.position} is not valid: give three finite numbers [m]"
+            )
         length = float(np.linalg.norm(axis)) if axis.shape == (3,) else 0.0
         if not np.isfinite(length) or length < 1e-9:
-            raise ModelError(f"joint '{self.name}': axis {self.axis} is not valid: give three finite numbers, not all zero")
+            raise ModelError(
+                f"joint '{self.name}': axis {self.axis} is not valid: give three finite numbers, not all zero"
+            )
         if self.kind is JointKind.FREE and self.parent != "world":
             raise ModelError(f"joint '{self.name}': a free joint stands on 'world', not on '{self.parent}'")
+        orientation = rotations.normalize(np.asarray(self.orientation, dtype=float))
+        if self.kind is JointKind.FREE and (position.any() or abs(orientation[0]) < 1.0):
+            raise ModelError(
+                f"joint '{self.name}': a free joint has no position or orientation of its own: q is its pose"
+            )
         object.__setattr__(self, "position", position)
         object.__setattr__(self, "axis", axis / length)
-        object.__setattr__(self, "orientation", rotations.normalize(np.asarray(self.orientation, dtype=float)))
+        object.__setattr__(self, "orientation", orientation)
 
     @property
     def nq(self) -> int:

@@ -86,8 +86,12 @@ class Tree:
             stack.extend(reversed(by_parent.get(joint.child, [])))
         if len(ordered) != len(joints):
             left = sorted({joint.name for joint in joints} - {joint.name for joint in ordered})
-            raise ModelError(f"joints {left} do not lead to 'world': a tree needs one path from every part to the world")
+            raise ModelError(
+                f"joints {left} do not lead to 'world': a tree needs one path from every part to the world"
+            )
         by_name = {part.name: part for part in parts}
+        if len(by_name) < len(parts):
+            _refuse_doubled("part", [part.name for part in parts])
         missing = [joint.child for joint in ordered if joint.child not in by_name]
         if missing:
             raise ModelError(f"joint child '{missing[0]}' is not a part: known parts are {sorted(by_name)}")
@@ -172,10 +176,8 @@ class Tree:
         return out
 
     def _check_names(self) -> None:
-        for kind, names in (("part", [p.name for p in self.parts]), ("joint", [j.name for j in self.joints])):
-            doubled = sorted({name for name in names if names.count(name) > 1})
-            if doubled:
-                raise ModelError(f"{kind} name '{doubled[0]}' is used twice: names are unique in a tree")
+        _refuse_doubled("part", [part.name for part in self.parts])
+        _refuse_doubled("joint", [joint.name for joint in self.joints])
 
     def _check_order(self) -> None:
         children = [joint.child for joint in self.joints]
@@ -236,4 +238,7 @@ class Tree:
                 moved[self.links[i].parent] += moved[i]
 
 
-__all__ = ["Frame", "Joint", "JointKind", "Link", "Part", "Shape", "Tree"]
+def _refuse_doubled(kind: str, names: Sequence[str]) -> None:
+    doubled = sorted({name for name in names if names.count(name) > 1})
+    if doubled:
+        raise ModelError(f"{kind} name '{doubled[0]}' is used twice: names are unique in a tree")

@@ -50,9 +50,7 @@ def tree_from_urdf(text: str, root: Literal["fixed", "free"] = "fixed") -> Tree:
     for joint in joints:
         for role, link in (("parent", joint.parent), ("child", joint.child)):
             if link not in links:
-                raise ModelError(
-                    f"joint '{joint.name}', <{role} link>: '{link}' is unknown: links are {_shown(links)}"
-                )
+                raise ModelError(f"joint '{joint.name}', <{role} link>: '{link}' is unknown: links are {_shown(links)}")
     roots = sorted(links.keys() - {joint.child for joint in joints})
     if len(roots) != 1:
         raise ModelError(f"a URDF needs exactly one link that is no joint's child, but has {_shown(roots)}")
@@ -149,9 +147,7 @@ def _joint(element: ElementTree.Element) -> Joint:
     if element.find("axis") is not None and kind in ("revolute", "continuous", "prismatic"):
         axis = _numbers(element, "axis", "xyz", where, 3)
         if not np.any(axis):
-            raise ModelError(
-                f"{where}, <axis xyz>: the axis is zero: give its direction, for example '0 0 1'"
-            )
+            raise ModelError(f"{where}, <axis xyz>: the axis is zero: give its direction, for example '0 0 1'")
         axis /= np.max(np.abs(axis))
     return Joint(name, JOINT_KINDS[kind], parent, child, position, orientation, axis)
 

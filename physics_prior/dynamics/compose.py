@@ -12,6 +12,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -41,15 +42,20 @@ def section(parameters, index):
 def step_source(effects: Sequence[Effect], constrained: bool, integrator: str) -> str:
     """The text of a scene's step module."""
     source = Path(__file__).with_name("step.py").read_text()
-    calls, slopes, imports = [], [], ["from physics_prior.dynamics.compose import section"]
-    for index, effect in enumerate(effect for effect in effects if effect.compiled is not None):
-        for function, arguments, lines in (
-            (effect.compiled.apply, "links, work, q, v, tau", calls),
-            (effect.compiled.differentiate, "links, work, q, v, tau_q, tau_v", slopes),
-        ):
-            name = function.py_func.__name__
-            lines.append(f"    {name}(section(parameters, {index}), {arguments})")
-            line = f"from {function.py_func.__module__} import {name}"
+    calls: list[str] = []
+    slopes: list[str] = []
+    imports = ["from physics_prior.dynamics.compose import section"]
+    compiled = [effect.compiled for effect in effects if effect.compiled is not None]
+    for index, force in enumerate(compiled):
+        parts: tuple[tuple[Any, str, list[str]], ...] = (
+            (force.apply.py_func, "links, work, q, v, tau", calls),
+            (force.differentiate.py_func, "links, work, q, v, tau_q, tau_v", slopes),
+        )
+        for function, arguments, lines in parts:
+            lines.append(f"    {function.__name__}(section(parameters, {index}), {arguments})")
+            # a user's effect stands outside the folders that key the cache: its own digest makes an edit miss
+            digest = hashlib.sha256(Path(function.__code__.co_filename).read_bytes()).hexdigest()[:16]
+            line = f"from {function.__module__} import {function.__name__}  # {digest}"
             if line not in imports:
                 imports.append(line)
     composed = "\n".join(imports)

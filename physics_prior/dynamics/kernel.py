@@ -30,7 +30,9 @@ def cache_directory() -> Path:
     package = Path(__file__).resolve().parents[1]
     for room in _KERNEL_ROOMS:
         for source in sorted((package / room).rglob("*.py")):
-            digest.update(source.read_bytes())
+            text = source.read_bytes()
+            if b"kernel" in text:
+                digest.update(text)
     for version in (numba.__version__, llvmlite.__version__, np.__version__, platform.python_version()):
         digest.update(version.encode())
     digest.update(f"{numba.config.CPU_NAME} {platform.machine()} {platform.processor()}".encode())

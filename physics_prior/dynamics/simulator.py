@@ -249,7 +249,7 @@ class Simulator:
     @property
     def effort(self) -> np.ndarray:
         """(nv,) generalized forces of the effects at the last ``acceleration`` or ``wrenches``."""
-        return self._scratch[2].copy()
+        return np.array(self._scratch[2])
 
     def _check_inertia(self) -> None:
         """Refuse joints that move no inertia, in any of a few postures (a point mass on a joint's axis, say)."""

@@ -110,8 +110,7 @@ class Weld(PinnedEffect):
 
 
 def _unit(axis: Vector) -> np.ndarray:
-    vector = np.array(axis)
-    return vector / np.linalg.norm(vector)
+    return np.array(axis) / float(np.linalg.norm(axis))
 
 
 def _across(axis: np.ndarray) -> np.ndarray:

@@ -1,8 +1,8 @@
 """The contract of an effect: something that acts on the body, compiled into the step only where a scene names it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -49,8 +49,8 @@ class CompiledForce:
             (nv, nv) by the tangent of q and by v.
     """
 
-    apply: Callable[..., None]
-    differentiate: Callable[..., None]
+    apply: Any
+    differentiate: Any
 
 
 class Effect(BaseModel):

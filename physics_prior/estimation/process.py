@@ -6,6 +6,7 @@ measured against.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -108,5 +109,8 @@ class KinematicProcess(_OnManifold):
         return F, np.kron(np.linalg.cholesky(moments), np.diag(self.scene.noise.jerk))
 
 
-PROCESSES = {"physics": PhysicsProcess, "kinematic": KinematicProcess}
+PROCESSES: dict[str, Callable[[Scene, Simulator], Process]] = {
+    "physics": PhysicsProcess,
+    "kinematic": KinematicProcess,
+}
 """The process models, by the name that ``--process`` knows them by."""

@@ -102,8 +102,8 @@ def measured_acceleration(acceleration: np.ndarray) -> np.ndarray | None:
 
 def difference(end: np.ndarray, start: np.ndarray, angle: bool) -> np.ndarray:
     """End - start, the shorter way round for angles."""
-    delta = np.asarray(end) - np.asarray(start)
-    return (delta + np.pi) % (2.0 * np.pi) - np.pi if angle else delta
+    delta: np.ndarray = np.asarray(end) - np.asarray(start)
+    return np.mod(delta + np.pi, 2.0 * np.pi) - np.pi if angle else delta
 
 
 def _is_angle(readouts: Sequence[Readout], name: str) -> bool:

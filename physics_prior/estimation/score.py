@@ -141,9 +141,11 @@ def _compared(scene: Scene, names: Sequence[str]) -> list[Readout]:
         readout for readout in scene.readouts if isinstance(readout, COORDINATES) and readout.name in names
     ]
     known = {readout.name for readout in readouts}
-    for joint in scene.tree.joints:
-        if joint.name in names and joint.name not in known and joint.nv == 1:
-            readouts.append(JointReadout(name=joint.name, joint=joint.name))
+    readouts += [
+        JointReadout(name=joint.name, joint=joint.name)
+        for joint in scene.tree.joints
+        if joint.name in names and joint.name not in known and joint.nv == 1
+    ]
     if not readouts:
         valid = [readout.name for readout in scene.readouts] + [joint.name for joint in scene.tree.joints]
         raise RecordingError(f"the reference names {list(names)}: none is a readout or joint of the scene, {valid}")

@@ -9,7 +9,7 @@ from physics_prior import rotations
 from physics_prior.errors import ModelError
 from physics_prior.inertia import MassProperties, combine
 from physics_prior.model.joint import Joint, JointKind
-from physics_prior.model.part import MASSLESS, Part, Shape
+from physics_prior.model.part import MASSLESS, Part
 
 
 @dataclass(frozen=True)

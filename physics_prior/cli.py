@@ -59,6 +59,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         # who reads our output has seen enough (`| head`); Python would complain once more when it flushes
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
+    except OSError as error:
+        print(f"physics-prior: {error.filename or 'a file'}: {error.strerror}", file=sys.stderr)
+        return BAD_INPUT
 
 
 def make_parser(words: Sequence[str]) -> argparse.ArgumentParser:

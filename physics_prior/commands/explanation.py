@@ -6,7 +6,7 @@ from math import degrees
 
 from rich.table import Table
 
-from physics_prior.commands.compilation import compiled
+from physics_prior.commands.compilation import compiling
 from physics_prior.commands.terminal import console, table
 from physics_prior.dynamics.compose import step_source
 from physics_prior.dynamics.simulator import Simulator
@@ -30,12 +30,13 @@ ROUNDS, STEPS, LINEARISATIONS = 15, 100, 10  # of timing: medians over rounds
 
 def explain(scene: Scene) -> None:
     """Print everything about a scene; compiles its step where it is not yet."""
-    simulator = compiled(scene)
+    with compiling(scene, "linearise"):
+        simulator = Simulator(scene.tree, scene.effects, scene.step.integrator)
+        state = _state(scene, simulator)
     out = console()
     out.print(scene.name, style="bold")
     out.print(scene.description)
-    parts = (_model(scene), _effects(scene), _measurements(scene), _readouts(scene), _state(scene, simulator))
-    for part in parts:
+    for part in (_model(scene), _effects(scene), _measurements(scene), _readouts(scene), state):
         out.print()
         out.print(part)
 

@@ -40,8 +40,9 @@ def run(args: argparse.Namespace) -> int:
     """Replay the bag; 0."""
     require_folder("--json", args.json)
     require_folder("--plot", args.plot)
-    from physics_prior.commands.compilation import compiled
+    from physics_prior.commands.compilation import compiling
     from physics_prior.commands.replay_report import print_report
+    from physics_prior.interface.warm_up import warm_up
     from physics_prior.recording.replay import replay
     from physics_prior.scene import load_scene
 
@@ -50,7 +51,8 @@ def run(args: argparse.Namespace) -> int:
 
         require_format(Path(args.plot))
     scene = load_scene(args.scene)
-    compiled(scene)
+    with compiling(scene, "linearise"):
+        warm_up(scene)
     with progress(f"replaying {args.bag.name}") as report:
         result = replay(
             args.bag,

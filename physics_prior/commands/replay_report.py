@@ -58,13 +58,12 @@ def _nis(nis: dict[str, Any]) -> str:
     if nis["mean"] is None:
         return "no measurement was used"
     low, high = nis["band95"]
-    verdict = "in"
-    if not low <= nis["mean"] <= high:
-        verdict = "below" if nis["mean"] < low else "above"
-    return (
-        f"mean {nis['mean']:.3f}, expected {nis['expected']:.3f}: {verdict} its 95 % band [{low:.3f}, {high:.3f}]"
-        + ("" if verdict == "in" else "; the noise stated is too " + ("large" if verdict == "below" else "small"))
-    )
+    verdict = "in its 95 % band"
+    if nis["mean"] > high:
+        verdict = "above its 95 % band, model and noise are trusted too much"
+    elif nis["mean"] < low:
+        verdict = "below its 95 % band, model and noise are trusted too little"
+    return f"mean {nis['mean']:.3f}, expected {nis['expected']:.3f}, {verdict} [{low:.3f}, {high:.3f}]"
 
 
 def _readouts(result: ReplayResult) -> Table:

@@ -57,14 +57,13 @@ def plot_replay(result: ReplayResult, path: Path) -> None:
     order = np.argsort(result.stamps, kind="stable")
     order = order[:: 1 + len(order) // MOST_POINTS]
     span = result.stamps.min(), result.stamps.max()
+    scored = any(name in result.reference for name in result.readouts)
     for row, name in enumerate(result.readouts):
         left, right = (figure.add_subplot(grid[row, column], xlim=span) for column in (0, 1))
         _readout(result, name, order, left, right)
         if row == 0:
             left.set_title("value", loc="left", fontsize=9)
-            right.set_title(
-                "error, estimate \u2212 reference" if result.reference else "uncertainty", loc="left", fontsize=9
-            )
+            right.set_title("error, estimate \u2212 reference" if scored else "uncertainty", loc="left", fontsize=9)
     _innovations(result, figure.add_subplot(grid[count, :], xlim=span))
     _health(result, figure.add_subplot(grid[count + 1, :], xlim=span))
     for axes in figure.axes:

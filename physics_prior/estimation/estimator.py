@@ -1,5 +1,6 @@
 """The estimator: measurements in, estimates out. The one core behind both doors, the node and the replay."""
 
+from bisect import insort
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -15,7 +16,7 @@ from physics_prior.estimation.process import PROCESSES
 from physics_prior.estimation.start import start
 from physics_prior.scene import Scene
 
-JUMP_AFTER = 5  # measurements in a row that are too old or doubled: time has jumped back (a looped bag)
+JUMP_AFTER = 5  # measurements in a row that find no place: the clock has jumped (a looped bag)
 STREAK = 3  # refused measurements in a row that degrade health
 DIFFERENCE = 1e-3  # of a standard deviation: the step of the forces' directional derivatives
 
@@ -41,7 +42,7 @@ class Estimator:
         self._read = self._late = self._rejected = 0
         self._dropped = Counts()
         self.on_settled: Callable[[Node], None] = lambda node: None
-        self._waiting: list[Measurement] = []
+        self._early: list[Measurement] = []  # before the start and what it was made from
         self._stale: list[Measurement] = []
 
     @property
@@ -63,14 +64,14 @@ class Estimator:
 
     def finish(self) -> None:
         """Settle all that the history still holds: no more measurements will come. The estimate is gone then."""
-        for node in self.history.nodes:
-            self._settle(node)
         self.reset()
 
     def reset(self) -> None:
         """Forget all measurements; the next ones start it cold."""
+        for node in self.history.nodes:
+            self._settle(node)
         self.history = History(self.filter, self.history.length)
-        self._waiting, self._stale = [], []
+        self._early, self._stale = [], []
 
     def reject(self, why: str) -> None:
         """Count a message that could not be made a measurement, and say why."""
@@ -81,20 +82,13 @@ class Estimator:
     def add(self, measurement: Measurement) -> bool:
         """Take in a measurement; return whether the newest estimate changed."""
         self._read += 1
-        if not self.history:
-            return self._begin(measurement)
-        if self.history.holds(measurement) or not self.history.reaches(measurement):
-            return self._set_aside(measurement)
-        self._stale.clear()
         try:
-            self._late += self.history.insert(measurement)
-        except SimulationError as problem:
+            self.filter.check(measurement)
+        except MeasurementError as problem:
+            self._rejected += 1
             self.last_rejection = str(problem)
-            self.reset()
             return False
-        for node in self.history.trim():
-            self._settle(node)
-        return True
+        return self._take(measurement)
 
     def estimate(self, stamp: int | None = None) -> Estimate:
         """The newest estimate, or what it predicts for a later stamp, ns.
@@ -169,49 +163,93 @@ class Estimator:
             return Health(Level.DEGRADED, f"the gate refused the last {posterior.refused} measurements")
         return Health(Level.OK)
 
-    def _begin(self, measurement: Measurement) -> bool:
-        """Try to start from what has come so far, as soon as a newer stamp tells that one stamp is complete."""
-        newest = max((each.stamp for each in self._waiting), default=measurement.stamp)
-        if measurement.stamp < newest - START_WINDOW:
-            return self._set_aside(measurement)
-        started = False
-        if measurement.stamp > newest:
-            started = self._start(newest)
-        if started:
-            self._read -= 1  # it is read again
-            return self.add(measurement)
-        self._waiting = [each for each in self._waiting if each.stamp > measurement.stamp - START_WINDOW]
-        self._waiting.append(measurement)
-        return False
+    def _take(self, measurement: Measurement) -> bool:
+        misplaced = self._misplaced(measurement)
+        if misplaced:
+            return self._set_aside(measurement, misplaced)
+        self._stale.clear()
+        self._late += measurement.stamp < self._newest
+        try:
+            changed = self._put(measurement)
+        except SimulationError as problem:
+            self.last_rejection = str(problem)
+            self.reset()
+            self._early = [measurement]
+            return False
+        for node in self.history.trim():
+            self._settle(node)
+        return changed
+
+    @property
+    def _newest(self) -> int:
+        """Stamp of the newest measurement, ns; 0 before the first."""
+        return self.stamp or (self._early[-1].stamp if self._early else 0)
+
+    def _misplaced(self, measurement: Measurement) -> str:
+        """Why a measurement finds no place; empty if it does."""
+        key, history = self.filter.key(measurement), self.history
+        if history.holds(measurement) or key in map(self.filter.key, self._early):
+            return "was doubled"
+        if (measurement.stamp - self._newest) * 1e-9 > self.scene.health.lost_after and history:
+            return "is so far ahead of all others that the estimate would be lost by then"
+        oldest = self._newest - START_WINDOW
+        if history:
+            oldest = history.nodes[0].measurement.stamp - START_WINDOW
+            if not history.from_start and not history.reaches(measurement):
+                return "is older than the history"
+        return "is older than the start" if measurement.stamp < oldest else ""
+
+    def _put(self, measurement: Measurement) -> bool:
+        """Put a measurement in its place. One at the start or before it changes the start: all are taken again, in order.
+
+        So the start, too, depends on what was measured and not on when it arrived.
+        """
+        if self.history and self.history.reaches(measurement) and measurement.stamp > self.history.begun:
+            self.history.insert(measurement)
+        elif measurement.stamp >= self._newest and not self.history:
+            self._put_newest(measurement)
+        else:
+            known = [*self._early, *(node.measurement for node in self.history.nodes), measurement]
+            self.history, self._early = History(self.filter, self.history.length), []
+            for each in sorted(known, key=self.filter.key):
+                self._put_newest(each)
+        return self.ready
+
+    def _put_newest(self, measurement: Measurement) -> None:
+        """Put a measurement after all others; a stamp newer than the waiting ones' tells that theirs are complete."""
+        stamp = self._early[-1].stamp if self._early else measurement.stamp
+        if self.history or (measurement.stamp > stamp and self._start(stamp)):
+            self.history.insert(measurement)
+            return
+        self._early = [each for each in self._early if each.stamp > measurement.stamp - START_WINDOW]
+        insort(self._early, measurement, key=self.filter.key)
 
     def _start(self, stamp: int) -> bool:
         """Start from the waiting measurements at a stamp, or from the newest of every topic about it."""
-        together = [each for each in self._waiting if each.stamp == stamp]
-        newest = {each.topic: each for each in sorted(self._waiting, key=lambda each: each.stamp)}
+        together = [each for each in self._early if each.stamp == stamp]
+        newest = {each.topic: each for each in self._early}
         for chosen in (together, list(newest.values())):
             posterior = start(self.filter, chosen, stamp)
             if posterior is not None:
                 self.history.begin([each for each in chosen if each.stamp == stamp], posterior)
-                self._waiting = []
+                self._early = [each for each in self._early if each.stamp < stamp]
                 return True
         return False
 
-    def _set_aside(self, measurement: Measurement) -> bool:
-        """Keep a measurement that finds no place; enough of them in a row mean that time has jumped back."""
-        newest = self.stamp or max(each.stamp for each in self._waiting)
-        if measurement.stamp < newest - START_WINDOW:  # merely late ones tell nothing about the clock
+    def _set_aside(self, measurement: Measurement, why: str) -> bool:
+        """Keep a measurement that finds no place; enough of them in a row mean that the clock has jumped."""
+        if not 0 <= self._newest - measurement.stamp <= START_WINDOW:  # merely late ones tell nothing about the clock
             self._stale.append(measurement)
-        if len(self._stale) >= JUMP_AFTER:
-            again = self._stale
-            self.reset()
-            self._read -= len(again)
-            self._rejected -= len(again) - 1
-            self.last_rejection = "time jumped back: the estimate was started anew"
-            changed = [self.add(each) for each in again]
-            return any(changed)
         self._rejected += 1
-        self.last_rejection = f"topic '{measurement.topic}': a measurement was doubled or older than the history"
-        return False
+        self.last_rejection = f"topic '{measurement.topic}': a measurement {why}"
+        if len(self._stale) < JUMP_AFTER:
+            return False
+        again = self._stale
+        self.reset()
+        self._rejected -= len(again)
+        self.last_rejection = "time jumped: the estimate was started anew"
+        changed = [self._take(each) for each in again]
+        return any(changed)
 
     def _settle(self, node: Node) -> None:
         """Count a node whose outcome is final, and hand it on."""

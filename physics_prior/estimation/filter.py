@@ -10,9 +10,9 @@ import numpy as np
 from scipy.stats import chi2
 
 from physics_prior.dynamics.simulator import Simulator
-from physics_prior.errors import MeasurementError
+from physics_prior.errors import MeasurementError, SimulationError
 from physics_prior.estimation.measurement import Measurement
-from physics_prior.estimation.observation import Innovation, innovation
+from physics_prior.estimation.observation import Innovation, check, innovation
 from physics_prior.estimation.process import Process, State, steps
 from physics_prior.estimation.square_root import innovate, predict_factor
 from physics_prior.scene import MeasurementSource, Scene
@@ -62,7 +62,7 @@ class Filter:
         self._limits: dict[int, float] = {}
 
     def predict(self, posterior: Posterior, stamp: int) -> Posterior:
-        """The posterior carried to a later stamp, ns."""
+        """The posterior carried to a later stamp, ns; SimulationError if the motion leaves the numbers."""
         if stamp <= posterior.stamp:
             return posterior
         count, h = steps((stamp - posterior.stamp) * 1e-9, self.scene.step.size)
@@ -73,10 +73,24 @@ class Filter:
             if W is None:
                 W = np.empty((len(factor), len(factor) + G.shape[1]))
             predict_factor(F, factor, G, W)
+        if not all(np.isfinite(array).all() for array in (state.q, state.v, state.acceleration, factor)):
+            raise SimulationError(
+                f"the prediction is not finite after steps of {h:g} s: a smaller step size or the other integrator may do"
+            )
         return replace(posterior, stamp=stamp, state=state, factor=factor, used=None, nis=0.0, dimension=0, start=False)
 
+    def key(self, measurement: Measurement) -> tuple[int, int]:
+        """What measurements are ordered by: their stamp, and where it is the same, their topic's place in the scene."""
+        return measurement.stamp, self.order[measurement.topic]
+
+    def check(self, measurement: Measurement) -> None:
+        """Raise MeasurementError if a measurement does not fit its source."""
+        if measurement.topic not in self.sources:
+            raise MeasurementError(f"topic '{measurement.topic}' is not measured: the scene reads {list(self.sources)}")
+        check(self.sources[measurement.topic], measurement)
+
     def innovation(self, measurement: Measurement, state: State) -> Innovation:
-        """The measurement against a state; MeasurementError if it does not fit its source."""
+        """The measurement, which must fit its source, against a state."""
         self.simulator.move(state.q, state.v)
         return innovation(self.sources[measurement.topic], measurement, self.simulator, state.q)
 
@@ -91,10 +105,8 @@ class Filter:
 
         Iterated (Gauss-Newton, Bell and Cathey 1993) where the correction is too large for one linearisation.
         """
-        try:
-            seen = self.innovation(measurement, prior.state)
-        except MeasurementError:
-            return prior
+        prior = replace(prior, used=None, nis=0.0, dimension=0, start=False)
+        seen = self.innovation(measurement, prior.state)
         m, n = len(seen.y), len(prior.factor)
         if m == 0:
             return prior

@@ -4,7 +4,7 @@ A late measurement is put in its place and everything after it is rolled again, 
 what was measured and not on when it arrived (the ordered map of past updates that Pronto keeps).
 """
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_left
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -28,55 +28,56 @@ class History:
     """Ordered nodes over a span of time.
 
     Attributes:
-        nodes: oldest first; those older than ``length`` ns before the newest are dropped.
+        nodes: oldest first; those older than ``length`` ns before the newest are dropped, but for one to roll from.
+        begun: stamp of the start, ns.
     """
 
     def __init__(self, filter: Filter, length: int) -> None:
         self.filter, self.length = filter, length
         self.nodes: list[Node] = []
+        self.begun = 0
         self._keys: list[tuple[int, int]] = []
 
     def __bool__(self) -> bool:
         return bool(self.nodes)
 
+    @property
+    def from_start(self) -> bool:
+        """Whether it still reaches back to the start."""
+        return bool(self._keys) and self._keys[0][0] == self.begun
+
     def begin(self, measurements: Iterable[Measurement], posterior: Posterior) -> None:
         """Start anew from a posterior that was made of these measurements."""
-        self.nodes = [Node(each, posterior, posterior) for each in sorted(measurements, key=self._key)]
-        self._keys = [self._key(node.measurement) for node in self.nodes]
+        self.nodes = [Node(each, posterior, posterior) for each in sorted(measurements, key=self.filter.key)]
+        self._keys = [self.filter.key(node.measurement) for node in self.nodes]
+        self.begun = posterior.stamp
 
     def holds(self, measurement: Measurement) -> bool:
         """Whether a measurement of this stamp and topic is there already."""
-        place = bisect_left(self._keys, self._key(measurement))
-        return place < len(self._keys) and self._keys[place] == self._key(measurement)
+        key = self.filter.key(measurement)
+        place = bisect_left(self._keys, key)
+        return place < len(self._keys) and self._keys[place] == key
 
     def reaches(self, measurement: Measurement) -> bool:
         """Whether a measurement still finds its place: the oldest node is what all others are rolled from."""
-        return bool(self._keys) and self._key(measurement) > self._keys[0]
+        return bool(self._keys) and self.filter.key(measurement) > self._keys[0]
 
-    def insert(self, measurement: Measurement) -> bool:
-        """Put a measurement in its place and roll on from there; return whether it was late."""
-        key = self._key(measurement)
-        place = bisect_right(self._keys, key)
-        late = place < len(self._keys)
+    def insert(self, measurement: Measurement) -> None:
+        """Put a measurement in its place, after the start, and roll on from there."""
+        key = self.filter.key(measurement)
+        place = bisect_left(self._keys, key)
         before = self.nodes[place - 1].posterior
         self._keys.insert(place, key)
         self.nodes.insert(place, Node(measurement, before, before))
         for index in range(place, len(self.nodes)):
             self._roll(index)
-        return late
 
     def trim(self) -> list[Node]:
-        """Drop and return the nodes that are older than the history's length."""
-        oldest = self._keys[-1][0] - self.length
-        count = 0
-        while self._keys[count][0] < oldest:
-            count += 1
-        dropped = self.nodes[:count]
-        del self.nodes[:count], self._keys[:count]
+        """Drop and return the nodes older than the history's length, all but the newest of them: others roll from it."""
+        count = bisect_left(self._keys, (self._keys[-1][0] - self.length, 0)) - 1 if self._keys else 0
+        dropped = self.nodes[: max(count, 0)]
+        del self.nodes[: len(dropped)], self._keys[: len(dropped)]
         return dropped
-
-    def _key(self, measurement: Measurement) -> tuple[int, int]:
-        return measurement.stamp, self.filter.order[measurement.topic]
 
     def _roll(self, index: int) -> None:
         """Predict and update one node from the one before it; start anew where the gate refused too many in a row."""

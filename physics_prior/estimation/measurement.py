@@ -9,6 +9,7 @@ from physics_prior.errors import MeasurementError, ModelError
 
 LARGEST = 1e9  # m: beyond it, a position is no measurement
 SYMMETRY = 1e-6  # of the largest entry
+SINGULAR = 1e-12  # least eigenvalue of the correlations, in which units do not count
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +74,8 @@ class JointsMeasurement(Measurement):
     positions: np.ndarray
 
     def __post_init__(self) -> None:
+        if len(set(self.names)) < len(self.names):
+            raise MeasurementError(f"names {list(self.names)} are not valid: give each joint once")
         _set(self, "positions", _finite("positions", self.positions, (len(self.names),)))
 
 
@@ -80,12 +83,12 @@ def _set(target: object, name: str, value: object) -> None:
     object.__setattr__(target, name, value)
 
 
-def _finite(name: str, value: np.ndarray, shape: tuple[int, ...] | None) -> np.ndarray:
+def _finite(name: str, value: np.ndarray, shape: tuple[int, ...] | None, largest: float = LARGEST) -> np.ndarray:
     array = np.array(value, dtype=float)
     if shape is not None and array.shape != shape:
         raise MeasurementError(f"{name} has shape {array.shape}: give {shape}")
-    if not np.all(np.abs(array) <= LARGEST):
-        raise MeasurementError(f"{name} {array.tolist()} is not valid: give finite numbers below {LARGEST:g}")
+    if not np.all(np.abs(array) <= largest):
+        raise MeasurementError(f"{name} {array.tolist()} is not valid: give finite numbers up to {largest:g}")
     return array
 
 
@@ -104,11 +107,16 @@ def _orientation(value: np.ndarray) -> np.ndarray:
 def _covariance(value: np.ndarray | None, size: int) -> np.ndarray | None:
     if value is None:
         return None
-    array = _finite("covariance", value, (size, size))
+    array = _finite("covariance", value, (size, size), LARGEST**2)
     worst = np.max(np.abs(array))
     if np.max(np.abs(array - array.T)) > SYMMETRY * worst:
         raise MeasurementError("covariance is not symmetric: give one with equal entries across the diagonal")
-    values = np.linalg.eigvalsh(array)
-    if values[0] <= 0.0:
-        raise MeasurementError(f"covariance has the eigenvalue {values[0]:g}: give a positive definite one")
+    deviations = np.sqrt(np.maximum(np.diag(array), 0.0))
+    if not deviations.all():
+        raise MeasurementError(f"covariance has the diagonal {np.diag(array).tolist()}: give variances above 0")
+    least = np.linalg.eigvalsh(array / np.outer(deviations, deviations))[0]
+    if least < SINGULAR:
+        raise MeasurementError(
+            f"covariance has correlations with the eigenvalue {least:g}: give a positive definite one"
+        )
     return array

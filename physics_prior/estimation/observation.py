@@ -32,14 +32,36 @@ class Innovation:
     noise: np.ndarray
 
 
+FITS = {
+    PoseSource: PoseMeasurement,
+    OrientationSource: OrientationMeasurement,
+    PointsSource: PointsMeasurement,
+    JointSource: JointsMeasurement,
+}
+"""Which measurement each kind of source brings."""
+
+
+def check(source: MeasurementSource, measurement: Measurement) -> None:
+    """Raise MeasurementError if a measurement is not of the source's kind or names what the source does not know."""
+    if not isinstance(measurement, FITS[type(source)]):
+        raise MeasurementError(
+            f"topic '{source.topic}' is a {type(source).__name__}: a {type(measurement).__name__} does not fit it"
+        )
+    if isinstance(source, PointsSource) and isinstance(measurement, PointsMeasurement):
+        count, expected = len(measurement.points), len(source.markers)
+        if count != expected:
+            raise MeasurementError(f"topic '{source.topic}' brought {count} points: the scene names {expected}")
+    if isinstance(source, JointSource) and isinstance(measurement, JointsMeasurement):
+        for name in measurement.names:
+            if name not in source.joints:
+                raise MeasurementError(f"joint '{name}' is not one of the source's: {list(source.joints)}")
+
+
 def innovation(source: MeasurementSource, measurement: Measurement, simulator: Simulator, q: np.ndarray) -> Innovation:
     """The innovation of a measurement at a configuration q (nq,); its kinematics must be up to date (``move``).
 
     Rotations are compared in the tangent space of the expected one, log(R_expected^T R_measured), in the measured frame's
-    axes (Sola 2017, ch. 4). m may be 0, where no marker is seen.
-
-    Raises:
-        MeasurementError: a measurement that is not of the source's kind or names joints that it does not know.
+    axes (Sola 2017, ch. 4). m may be 0, where no marker is seen. The measurement must fit its source (``check``).
     """
     if isinstance(source, PoseSource) and isinstance(measurement, PoseMeasurement):
         position, R, jacobian = _frame(simulator, source)
@@ -61,10 +83,6 @@ def innovation(source: MeasurementSource, measurement: Measurement, simulator: S
             return Innovation(y, R.T @ jacobian[:3], np.linalg.cholesky(measurement.covariance))
         return Innovation(y, R.T @ jacobian[:3], source.orientation_noise * np.eye(3))
     if isinstance(source, PointsSource) and isinstance(measurement, PointsMeasurement):
-        if len(measurement.points) != len(source.markers):
-            raise MeasurementError(
-                f"topic '{source.topic}' brought {len(measurement.points)} points: the scene names {len(source.markers)}"
-            )
         seen = np.flatnonzero(~np.isnan(measurement.points).any(axis=1))
         y, H = np.zeros(3 * len(seen)), np.zeros((3 * len(seen), simulator.nv))
         for row, index in enumerate(seen):
@@ -74,18 +92,14 @@ def innovation(source: MeasurementSource, measurement: Measurement, simulator: S
             y[3 * row : 3 * row + 3] = measurement.points[index] - position - R @ point
             H[3 * row : 3 * row + 3] = simulator.jacobian(marker.part, point)[3:]
         return Innovation(y, H, source.noise * np.eye(len(y)))
-    if isinstance(source, JointSource) and isinstance(measurement, JointsMeasurement):
-        y, H = np.zeros(len(measurement.names)), np.zeros((len(measurement.names), simulator.nv))
-        for row, name in enumerate(measurement.names):
-            if name not in source.joints:
-                raise MeasurementError(f"joint '{name}' is not one of the source's: {list(source.joints)}")
-            link = simulator.tree.link(source.joints[name])
-            y[row] = measurement.positions[row] - q[link.q][0]
-            H[row, link.v] = 1.0
-        return Innovation(y, H, source.noise * np.eye(len(y)))
-    raise MeasurementError(
-        f"topic '{source.topic}' is a {type(source).__name__}: a {type(measurement).__name__} does not fit it"
-    )
+    assert isinstance(source, JointSource)
+    assert isinstance(measurement, JointsMeasurement)
+    y, H = np.zeros(len(measurement.names)), np.zeros((len(measurement.names), simulator.nv))
+    for row, name in enumerate(measurement.names):
+        link = simulator.tree.link(source.joints[name])
+        y[row] = measurement.positions[row] - q[link.q][0]
+        H[row, link.v] = 1.0
+    return Innovation(y, H, source.noise * np.eye(len(y)))
 
 
 def _frame(simulator: Simulator, source: PoseSource | OrientationSource) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -8,9 +8,11 @@ from scipy.stats import chi2
 from physics_prior.estimation.filter import Filter, Posterior
 from physics_prior.estimation.measurement import Measurement
 from physics_prior.estimation.square_root import triangularise
+from physics_prior.model import JointKind, Tree
 
 ITERATIONS = 30
-CONVERGED = 1e-9  # rad or m
+CONVERGED = 1e-9  # rad or m, or of the largest coordinate
+LARGEST_TURN = 1.0  # rad in one iteration: beyond it a linearisation says nothing; lengths may go any way
 OBSERVABLE = 1e-6  # least relative singular value of the whitened measurements by a freedom
 TRIES = 6  # starting configurations: the scene's own, then random ones (always the same)
 SPREAD = 1.0  # rad or m
@@ -60,8 +62,9 @@ def _plausible(filter: Filter, cost: float, freedom: int) -> bool:
 def _gauss_newton(
     filter: Filter, measurements: Sequence[Measurement], q: np.ndarray
 ) -> tuple[float, np.ndarray, np.ndarray, int] | None:
-    """Cost, configuration, covariance factor and redundancy of the best fit from q; None if not observable."""
+    """Cost, configuration, covariance factor and redundancy of the best fit from q; None if not observable or not found."""
     simulator, v = filter.simulator, np.zeros(filter.simulator.nv)
+    turning = _turning(simulator.tree)
     state = filter.process.start(q, v)
     for _ in range(ITERATIONS):
         rows, errors = [], []
@@ -77,15 +80,26 @@ def _gauss_newton(
         if len(s) < basis.shape[1] or s[-1] <= OBSERVABLE * s[0]:
             return None
         step = basis @ (V.T @ ((U.T @ y) / s))
-        size = float(np.max(np.abs(step)))
-        state.q[:] = simulator.displaced(state.q, step * min(1.0, 1.0 / size) if size > 0.0 else step)
+        turn = float(np.max(np.abs(step[turning]), initial=0.0))
+        state.q[:] = simulator.displaced(state.q, step * min(1.0, LARGEST_TURN / max(turn, LARGEST_TURN)))
         simulator.project(state.q, v)
-        if size < CONVERGED:
+        if np.max(np.abs(step)) < CONVERGED * max(1.0, float(np.max(np.abs(state.q)))):
             break
+    else:
+        return None
     factor = np.zeros((simulator.nv, simulator.nv))
     factor[:, : basis.shape[1]] = basis @ V.T / s
     triangularise(factor)
     return float(y @ y - np.sum((U.T @ y) ** 2)), state.q, factor, len(y) - basis.shape[1]
+
+
+def _turning(tree: Tree) -> np.ndarray:
+    """(nv,) which degrees of freedom turn."""
+    turning = np.zeros(tree.nv, dtype=bool)
+    for link in tree.links:
+        if link.joint.kind is not JointKind.PRISMATIC:
+            turning[link.v][-3:] = True
+    return turning
 
 
 def _free_directions(filter: Filter, q: np.ndarray) -> np.ndarray:

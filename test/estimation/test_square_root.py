@@ -1,0 +1,124 @@
+"""Square-root algebra against the dense formulas, where those still have digits, and beyond."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import chi2
+
+from physics_prior.estimation.square_root import innovate, normalised_error, predict_factor, triangularise
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def _factor(rng, n, decades):
+    """Lower factor of a covariance whose standard deviations span 10^-decades to 10^decades."""
+    S = np.zeros((n, n))
+    S[:] = 10.0 ** rng.uniform(-decades, decades, size=(n, 1)) * rng.normal(size=(n, n))
+    triangularise(S)
+    return S
+
+
+def _relative(difference, covariance):
+    """The largest error of a covariance's entries, in units of their standard deviations."""
+    deviations = np.sqrt(np.diag(covariance))
+    return np.max(np.abs(difference) / np.outer(deviations, deviations))
+
+
+@given(seeds, st.integers(1, 8), st.integers(0, 8))
+def test_triangularise_keeps_the_square(seed, n, more):
+    rng = np.random.default_rng(seed)
+    W = 10.0 ** rng.uniform(-6, 6, size=(n, 1)) * rng.normal(size=(n, n + more))
+    L = W.copy()
+    triangularise(L)
+    assert np.array_equal(np.triu(L, 1), np.zeros_like(L))
+    assert np.all(np.diag(L) >= 0.0)
+    assert _relative(L @ L.T - W @ W.T, W @ W.T) < 1e-13  # 3e-15
+
+
+def test_triangularise_leaves_zero_rows_alone():
+    W = np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 0.0]])
+    triangularise(W)
+    np.testing.assert_allclose(W @ W.T, [[0.0, 0.0], [0.0, 25.0]], atol=1e-15)
+
+
+@given(seeds, st.integers(1, 8), st.integers(1, 8))
+def test_prediction_is_the_dense_one(seed, n, g):
+    rng = np.random.default_rng(seed)
+    F, G, S = rng.normal(size=(n, n)), rng.normal(size=(n, g)), _factor(rng, n, 0)
+    expected = F @ S @ S.T @ F.T + G @ G.T
+    predict_factor(F, S, G, np.empty((n, n + g)))
+    assert _relative(S @ S.T - expected, expected) < 1e-13  # 2e-15
+
+
+@given(seeds, st.integers(1, 8), st.integers(1, 6), st.integers(0, 3))
+def test_update_is_the_dense_one(seed, n, m, unseen):
+    rng = np.random.default_rng(seed)
+    size = max(1, n - unseen)
+    H, S, noise, y = rng.normal(size=(m, size)), _factor(rng, n, 0), _factor(rng, m, 0), rng.normal(size=m)
+    noise += np.eye(m)
+    W, whitened = np.empty((m + n, m + n)), np.empty(m)
+    nis = innovate(S, H, noise, W, whitened, y)
+    full = np.hstack([H, np.zeros((m, n - size))])
+    P, R = S @ S.T, noise @ noise.T
+    innovation = full @ P @ full.T + R
+    K = P @ full.T @ np.linalg.inv(innovation)
+    joseph = (np.eye(n) - K @ full) @ P @ (np.eye(n) - K @ full).T + K @ R @ K.T
+    conditioning = np.linalg.cond(innovation)
+    assert nis == pytest.approx(y @ np.linalg.solve(innovation, y), rel=1e-13 * conditioning)
+    np.testing.assert_allclose(W[m:, :m] @ whitened, K @ y, rtol=0, atol=1e-13 * conditioning * np.linalg.norm(K @ y))
+    assert _relative(W[m:, m:] @ W[m:, m:].T - joseph, P) < 1e-13 * conditioning
+
+
+@given(seeds)
+def test_thousands_of_updates_at_extreme_variances(seed):
+    """No update, however sharp or dull, leaves the covariance anything but one."""
+    rng = np.random.default_rng(seed)
+    n, m = 4, 2
+    S = np.diag(10.0 ** rng.uniform(-6, 6, size=n))
+    W, whitened = np.empty((m + n, m + n)), np.empty(m)
+    scratch = np.empty((n, 2 * n))
+    for _ in range(2000):
+        noise = np.diag(10.0 ** rng.uniform(-6, 6, size=m))  # variances 1e-12 to 1e12
+        before = np.sum(S * S, axis=1)
+        nis = innovate(S, rng.normal(size=(m, n)), noise, W, whitened, rng.normal(size=m))
+        assert np.isfinite(nis)
+        S = np.ascontiguousarray(W[m:, m:])
+        assert np.isfinite(S).all()
+        assert np.all(np.sum(S * S, axis=1) <= before * (1.0 + 1e-9))  # a measurement never takes knowledge away
+        G = np.diag(10.0 ** rng.uniform(-8, 1, size=n))
+        predict_factor(np.eye(n) + 0.1 * rng.normal(size=(n, n)), S, G, scratch)
+    P = S @ S.T
+    assert np.array_equal(P, P.T)
+    deviations = np.sqrt(np.diag(P))
+    assert np.linalg.eigvalsh(P / np.outer(deviations, deviations))[0] > -1e-15
+
+
+def test_many_measurements_add_up_their_information():
+    """Of a still state: P^-1 = P0^-1 + sum H^T R^-1 H, through 5000 updates."""
+    rng = np.random.default_rng(1)
+    n, m = 5, 3
+    S = np.diag(10.0 ** rng.uniform(-1, 3, size=n))
+    information = np.linalg.inv(S @ S.T)
+    W, whitened = np.empty((m + n, m + n)), np.empty(m)
+    for _ in range(5000):
+        H, noise = rng.normal(size=(m, n)), np.diag(10.0 ** rng.uniform(-1, 3, size=m))
+        information += H.T @ np.linalg.inv(noise @ noise.T) @ H
+        innovate(S, H, noise, W, whitened, np.zeros(m))
+        S = np.ascontiguousarray(W[m:, m:])
+    expected = np.linalg.inv(information)
+    assert _relative(S @ S.T - expected, expected) < 1e-11  # 2e-13
+
+
+@pytest.mark.parametrize("rank", [1, 3, 6])
+def test_normalised_error_is_chi_square_of_the_rank(rank):
+    """Units far apart, and directions without any error as constraints leave them."""
+    rng = np.random.default_rng(rank)
+    n, count = 6, 4000
+    half = 10.0 ** rng.uniform(-5, 5, size=(n, 1)) * rng.normal(size=(n, rank))
+    S = np.zeros((n, n))
+    S[:, :rank] = half
+    results = [normalised_error(S, half @ rng.normal(size=rank)) for _ in range(count)]
+    assert {found for _, found in results} == {rank}
+    low, high = chi2.ppf([0.001, 0.999], rank * count) / count
+    assert low < np.mean([value for value, _ in results]) < high

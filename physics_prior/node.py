@@ -27,7 +27,6 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
-from physics_prior.dynamics.kernel import cache_directory
 from physics_prior.estimation.estimate import Estimate, Health, Level
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.interface import Output, take_in
@@ -125,8 +124,9 @@ class PhysicsPriorNode(LifecycleNode):
 
     def _configure(self) -> None:
         scene = load_scene(require_scene(self._value("scene")))
-        if not cache_directory().exists():
-            self.get_logger().info("compiling, once: the next start takes a second")
+        self.get_logger().info(
+            f"preparing scene '{scene.name}': half a minute where it was never compiled, else a second"
+        )
         scene = replace(scene, frame_id=self._value("frame_id") or scene.frame_id)
         warm_up(scene)
         self._estimator = Estimator(scene, history_length=self._value("history_length"))
@@ -274,8 +274,11 @@ class PhysicsPriorNode(LifecycleNode):
         assert self._estimator is not None
         health = self._estimator.health_at(self._present())
         if self._health is None or health.level is not self._health.level:
-            log = self.get_logger().info if health.level is Level.OK else self.get_logger().warning
-            log(f"health {health.level.name}" + (f": {health.cause}" if health.cause else ""))
+            # rclpy takes one severity a line of code
+            if health.level is Level.OK:
+                self.get_logger().info("health OK")
+            else:
+                self.get_logger().warning(f"health {health.level.name}: {health.cause}")
         self._health = health
         return health
 

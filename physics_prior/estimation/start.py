@@ -67,7 +67,7 @@ def _gauss_newton(
     turning = _turning(simulator.tree)
     state = filter.process.start(q, v)
     for _ in range(ITERATIONS):
-        rows, errors = [], []
+        rows, errors = [np.zeros((0, simulator.nv))], [np.zeros(0)]
         for measurement in measurements:
             seen = filter.innovation(measurement, state)
             rows.append(np.linalg.solve(seen.noise, seen.H))

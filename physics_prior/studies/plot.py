@@ -36,6 +36,8 @@ MOST_POINTS = 4000  # of a line: more are not to be seen
 WINDOW = 1.0  # s, of the running mean of innovations
 SIGMAS = 2.0
 EDGE = 0.5  # percent of the values that may lie outside the axes: those of the start, mostly
+SETTLED = 97.0  # percentile of the deviations that must lie inside: in the beginning they are large
+MARGIN = 1.15
 
 
 def require_format(path: Path) -> None:
@@ -106,6 +108,7 @@ def _readout(result: ReplayResult, name: str, order: np.ndarray, left: Axes, rig
     if angle:
         values = np.unwrap(values, axis=0)
     reference = _reference(result, name, stamps)
+    worst = 0.0
     for index, color in enumerate(LINES[: values.shape[1]]):
         value, band = values[:, index], spread[:, index]
         label = "xyz"[index] if values.shape[1] == 3 else "estimate"
@@ -116,10 +119,13 @@ def _readout(result: ReplayResult, name: str, order: np.ndarray, left: Axes, rig
             error = value - reference[:, index]
             if angle:
                 error = (error + np.pi) % (2.0 * np.pi) - np.pi
+            worst = max(worst, float(np.nanpercentile(np.abs(error), 100.0 - EDGE)))
             left.plot(stamps, scale * (value - error), color=REFERENCE, **UNDERLAY)
             right.plot(stamps, error_scale * error, color=color, lw=0.8)
-    _limit(left, scale * values)
-    _limit(right, error_scale * np.concatenate([-spread, spread]))
+    typical = np.median(spread, axis=0)
+    _limit(left, scale * np.concatenate([values - typical, values + typical]))
+    largest = error_scale * MARGIN * max(float(np.percentile(spread, SETTLED)), worst)
+    right.set_ylim(-largest or -1e-3, largest or 1e-3)
     if values.shape[1] == 3 or reference is not None:
         if reference is not None:
             left.plot([], [], color=REFERENCE, **UNDERLAY, label="reference")
@@ -198,7 +204,7 @@ def _columns(values: np.ndarray) -> np.ndarray:
 def _limit(axes: Axes, values: np.ndarray) -> None:
     """Show what most of the values need: not the uncertainty of the first moment, which dwarfs all else."""
     low, high = np.percentile(values, [EDGE, 100.0 - EDGE])
-    margin = 0.12 * (high - low) or 1e-3 * max(1.0, abs(high))
+    margin = (MARGIN - 1.0) * (high - low) or 1e-3 * max(1.0, abs(high))
     axes.set_ylim(low - margin, high + margin)
 
 

@@ -3,18 +3,17 @@
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
-from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import LifecycleNode
+
+from launch import LaunchDescription
 
 PARAMETERS = Path(get_package_share_directory("physics_prior"), "config", "node.yaml")
 
 
 def generate_launch_description() -> LaunchDescription:
-    scene = DeclareLaunchArgument(
-        "scene", default_value="uw_double_pendulum", description="a shipped scene or the path of a scene file"
-    )
+    scene = DeclareLaunchArgument("scene", description="a shipped scene or the path of a scene file")
     parameters = DeclareLaunchArgument(
         "params_file", default_value=str(PARAMETERS), description="all other parameters of the node"
     )
@@ -24,7 +23,7 @@ def generate_launch_description() -> LaunchDescription:
         executable="physics_prior_node",
         name="physics_prior",
         namespace=LaunchConfiguration("namespace"),
-        # the later one holds: a scene given here wins over the file's
+        # the later one holds: the scene given here, not the file's
         parameters=[LaunchConfiguration("params_file"), {"scene": LaunchConfiguration("scene")}],
         output="screen",
     )

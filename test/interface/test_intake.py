@@ -94,7 +94,6 @@ def test_covariance_turns_from_fixed_axes_to_the_measured_frames(source, every_j
     w, x, y, z = wxyz
     pose = Pose(Point(), Quaternion(x, y, z, w))
     measured = measurement_of(source("/arm/pose"), with_covariance(C, pose), every_joint)
-    print("JAC", np.abs(measured.covariance - J @ C @ J.T).max())
     np.testing.assert_allclose(measured.covariance, J @ C @ J.T, atol=1e-12)  # 2e-14
     turned = measurement_of(source("/base/imu"), with_covariance(C, pose), every_joint)
     np.testing.assert_allclose(turned.covariance, measured.covariance[3:, 3:], atol=1e-15)
@@ -109,7 +108,6 @@ def test_covariance_of_samples(source, every_joint):
     turn = rotations.log(rotations.multiply(rotations.conjugate(q), moved))
     spread = np.cov(np.concatenate([d[:, :3], turn], axis=1).T)
     measured = measurement_of(source("/arm/pose"), with_covariance(C), every_joint)
-    print("SPREAD", np.abs(spread - measured.covariance).max() / np.max(C))
     np.testing.assert_allclose(spread, measured.covariance, atol=0.03 * np.max(C))  # 0.007
 
 

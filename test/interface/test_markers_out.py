@@ -87,7 +87,6 @@ def test_ellipsoids_hold_95_percent_of_centres_of_mass(draw, every_joint_simulat
             away = origin + R @ link.mass_properties.center_of_mass - array_of(pose.position)
             along = rotations.rotate(rotations.conjugate(wxyz_of(pose.orientation)), away)
             inside[index] += np.sum((2 * along / scale) ** 2) < 1.0
-    print("INSIDE", inside / len(errors))
     np.testing.assert_allclose(inside / len(errors), 0.95, atol=0.02)  # 0.004
 
 

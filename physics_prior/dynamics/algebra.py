@@ -3,8 +3,6 @@
 Tuples become scalars in registers: nothing is allocated, and the kernels above read like the textbook.
 """
 
-import math
-
 from physics_prior.dynamics.kernel import inline_kernel
 
 ZERO = (0.0, 0.0, 0.0)
@@ -132,6 +130,73 @@ def product(a, b):
 
 
 @inline_kernel
+def minus9(a):
+    """The matrix -a."""
+    return -a[0], -a[1], -a[2], -a[3], -a[4], -a[5], -a[6], -a[7], -a[8]
+
+
+@inline_kernel
+def minus_outer(a, u, w):
+    """The matrix a - u w^T."""
+    return (
+        a[0] - u[0] * w[0],
+        a[1] - u[0] * w[1],
+        a[2] - u[0] * w[2],
+        a[3] - u[1] * w[0],
+        a[4] - u[1] * w[1],
+        a[5] - u[1] * w[2],
+        a[6] - u[2] * w[0],
+        a[7] - u[2] * w[1],
+        a[8] - u[2] * w[2],
+    )
+
+
+@inline_kernel
+def difference9(a, b):
+    """The matrix a - b."""
+    return (
+        a[0] - b[0],
+        a[1] - b[1],
+        a[2] - b[2],
+        a[3] - b[3],
+        a[4] - b[4],
+        a[5] - b[5],
+        a[6] - b[6],
+        a[7] - b[7],
+        a[8] - b[8],
+    )
+
+
+@inline_kernel
+def scale9(s, a):
+    """The matrix s a."""
+    return s * a[0], s * a[1], s * a[2], s * a[3], s * a[4], s * a[5], s * a[6], s * a[7], s * a[8]
+
+
+@inline_kernel
+def sum9(a, b):
+    """The matrix a + b."""
+    return (
+        a[0] + b[0],
+        a[1] + b[1],
+        a[2] + b[2],
+        a[3] + b[3],
+        a[4] + b[4],
+        a[5] + b[5],
+        a[6] + b[6],
+        a[7] + b[7],
+        a[8] + b[8],
+    )
+
+
+@inline_kernel
+def rows_crossed(u, a):
+    """The matrix whose rows are u x (row of a)."""
+    p, q, r = cross(u, (a[0], a[1], a[2])), cross(u, (a[3], a[4], a[5])), cross(u, (a[6], a[7], a[8]))
+    return p[0], p[1], p[2], q[0], q[1], q[2], r[0], r[1], r[2]
+
+
+@inline_kernel
 def full(m):
     """A symmetric 6-tuple as a 9-tuple."""
     return m[0], m[1], m[2], m[1], m[3], m[4], m[2], m[4], m[5]
@@ -179,25 +244,6 @@ def solve3(m, u):
         (c0 * u[0] + (m[2] * m[7] - m[1] * m[8]) * u[1] + (m[1] * m[5] - m[2] * m[4]) * u[2]) * d,
         (c1 * u[0] + (m[0] * m[8] - m[2] * m[6]) * u[1] + (m[2] * m[3] - m[0] * m[5]) * u[2]) * d,
         (c2 * u[0] + (m[1] * m[6] - m[0] * m[7]) * u[1] + (m[0] * m[4] - m[1] * m[3]) * u[2]) * d,
-    )
-
-
-@inline_kernel
-def rotation_about(axis, angle):
-    """The rotation matrix by angle about a unit axis (Rodrigues)."""
-    s, c = math.sin(angle), math.cos(angle)
-    k = 1.0 - c
-    x, y, z = axis
-    return (
-        c + k * x * x,
-        k * x * y - s * z,
-        k * x * z + s * y,
-        k * x * y + s * z,
-        c + k * y * y,
-        k * y * z - s * x,
-        k * x * z - s * y,
-        k * y * z + s * x,
-        c + k * z * z,
     )
 
 

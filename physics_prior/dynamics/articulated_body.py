@@ -9,16 +9,22 @@ constraints, projections and derivatives run through the same factors.
 from physics_prior.dynamics.algebra import (
     ZERO,
     cross,
+    difference9,
     dot,
+    full,
     get3,
     get6,
     get9,
     minus,
+    minus_outer,
     plus,
+    product,
     put3,
     put6,
     put9,
+    rows_crossed,
     scale,
+    sum9,
     symmetric_inverse,
     symmetric_times,
     times,
@@ -61,6 +67,33 @@ def shift_to_parent(up, arm, J, H, M):
 
 
 @inline_kernel
+def shift_mass_to_parent(up, arm, M):
+    """Add an articulated mass at a joint, all that a ball joint passes on, to the parent link's inertia."""
+    x, y, z = arm
+    m0, m1, m2, m3, m4, m5 = M
+    s0, s1, s2 = y * m2 - z * m1, y * m4 - z * m3, y * m5 - z * m4
+    s3, s4, s5 = z * m0 - x * m2, z * m1 - x * m4, z * m2 - x * m5
+    s6, s7, s8 = x * m1 - y * m0, x * m3 - y * m1, x * m4 - y * m2
+    up.J[0] -= s1 * z - s2 * y
+    up.J[1] -= s2 * x - s0 * z
+    up.J[2] -= s0 * y - s1 * x
+    up.J[3] -= s5 * x - s3 * z
+    up.J[4] -= s3 * y - s4 * x
+    up.J[5] -= s6 * y - s7 * x
+    up.H[0] += s0
+    up.H[1] += s1
+    up.H[2] += s2
+    up.H[3] += s3
+    up.H[4] += s4
+    up.H[5] += s5
+    up.H[6] += s6
+    up.H[7] += s7
+    up.H[8] += s8
+    for k in range(6):
+        up.M[k] += M[k]
+
+
+@inline_kernel
 def _schur(M, H, K):
     """The symmetric matrix M - H^T K, K = J^-1 H: the mass felt through a ball joint."""
     return (
@@ -92,6 +125,7 @@ def _symmetric_product(a, h):
 @inline_kernel
 def rigid_inertias(links, work):
     """Fill J, H and M of every link with those of the rigid link about its own joint; needs the kinematics."""
+    work[0].factored = 0
     for i in range(links.shape[0]):
         here = work[i]
         m = links[i].mass
@@ -159,22 +193,22 @@ def factorize(links, work):
                     H[7] - a[2] * f[1],
                     H[8] - a[2] * f[2],
                 )
+                # the reduced inertia, which is what the parent feels and what the bias runs through
+                put6(here.J, J)
+                put9(here.H, H)
+                put6(here.M, M)
+                shift_to_parent(work[link.parent], get3(here.arm), J, H, M)
         else:
             inverse = symmetric_inverse(J)
             put6(here.J_inverse, inverse)
             K = _symmetric_product(inverse, H)
             put9(here.K, K)
             M = _schur(M, H, K)
-            J = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-            H = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            put6(here.M, M)
             if link.kind == FREE:
                 put6(here.M_inverse, symmetric_inverse(M))
-        # the reduced inertia, which is what the parent feels and what the bias runs through
-        put6(here.J, J)
-        put9(here.H, H)
-        put6(here.M, M)
-        if link.parent >= 0:
-            shift_to_parent(work[link.parent], get3(here.arm), J, H, M)
+            elif link.parent >= 0:
+                shift_mass_to_parent(work[link.parent], get3(here.arm), M)
 
 
 @kernel
@@ -199,8 +233,12 @@ def accelerate(links, work, tau, gravity, vdot):
             here.u[0] = u
             if link.parent >= 0:
                 share = u * here.D
-                moment = plus(moment, scale(share, get3(here.U_moment)))
-                force = plus(force, scale(share, get3(here.U_force)))
+                angular, linear = get3(here.coriolis_angular), get3(here.coriolis_linear)
+                H = get9(here.H)
+                carried = plus(symmetric_times(get6(here.J), angular), times(H, linear))
+                moment = plus(moment, plus(carried, scale(share, get3(here.U_moment))))
+                carried = plus(transposed_times(H, angular), symmetric_times(get6(here.M), linear))
+                force = plus(force, plus(carried, scale(share, get3(here.U_force))))
         else:
             first = n + 3 if link.kind == FREE else n
             torque = times(get9(here.rotation), (tau[first], tau[first + 1], tau[first + 2]))
@@ -210,11 +248,9 @@ def accelerate(links, work, tau, gravity, vdot):
             force = plus(force, transposed_times(get9(here.K), u))
             if link.kind == FREE:
                 put3(here.bias_force, minus((tau[n], tau[n + 1], tau[n + 2]), force))
+            elif link.parent >= 0:
+                force = plus(force, symmetric_times(get6(here.M), get3(here.coriolis_linear)))
         if link.parent >= 0:
-            angular, linear = get3(here.coriolis_angular), get3(here.coriolis_linear)
-            H = get9(here.H)
-            moment = plus(moment, plus(symmetric_times(get6(here.J), angular), times(H, linear)))
-            force = plus(force, plus(transposed_times(H, angular), symmetric_times(get6(here.M), linear)))
             up = work[link.parent]
             moment = plus(moment, cross(get3(here.arm), force))
             put3(up.bias_moment, plus(get3(up.bias_moment), moment))
@@ -252,72 +288,79 @@ def accelerate(links, work, tau, gravity, vdot):
 
 
 @kernel
-def push(links, work, link_index, point, force, sign, y, z):
-    """Run a force at a world point on a link inward through the factors: add S^T w to y (nv,) and D^-1 S^T w to z (nv,).
+def push(links, work, link_index, point, forces, count, y, z):
+    """Run forces at a world point on a link inward through the factors: add S^T w to y and D^-1 S^T w to z.
 
-    y_r . z_s of two such forces is their entry of A M^-1 A^T. Entries of ball joints are in world axes. The wrench
-    left after a joint moves on to its parent; a force on the world does nothing.
+    forces is a 3x3 matrix whose first ``count`` rows are forces; y and z (count, w) have the columns of the degrees of freedom
+    that constraints move. y_r . z_s of two forces is their entry of A M^-1 A^T. Entries of ball joints are in world
+    axes. The wrench left after a joint moves on to its parent; a force on the world does nothing.
     """
     i = link_index
     if i < 0:
         return
-    force = scale(sign, force)
-    moment = cross(minus(point, get3(work[i].origin)), force)
+    moments = rows_crossed(minus(point, get3(work[i].origin)), forces)
     while i >= 0:
         link, here = links[i], work[i]
-        n = link.v
+        k = link.column
         if link.kind == REVOLUTE or link.kind == PRISMATIC:
-            s = dot(get3(here.axis), moment if link.kind == REVOLUTE else force)
-            y[n] += s
-            share = s * here.D
-            z[n] += share
-            moment = minus(moment, scale(share, get3(here.U_moment)))
-            force = minus(force, scale(share, get3(here.U_force)))
+            s = times(moments if link.kind == REVOLUTE else forces, get3(here.axis))
+            share = scale(here.D, s)
+            for r in range(count):
+                y[r, k] += s[r]
+                z[r, k] += share[r]
+            moments = minus_outer(moments, share, get3(here.U_moment))
+            forces = minus_outer(forces, share, get3(here.U_force))
+            moments = sum9(moments, rows_crossed(get3(here.arm), forces))
         else:
-            turn = symmetric_times(get6(here.J_inverse), moment)
-            rest = minus(force, transposed_times(get9(here.K), moment))
+            turn = product(moments, full(get6(here.J_inverse)))
+            forces = difference9(forces, product(moments, get9(here.K)))
             if link.kind == FREE:
-                shift = symmetric_times(get6(here.M_inverse), rest)
+                shift = product(forces, full(get6(here.M_inverse)))
+                for r in range(count):
+                    for c in range(3):
+                        y[r, k + c] += forces[3 * r + c]
+                        z[r, k + c] += shift[3 * r + c]
+                k += 3
+            for r in range(count):
                 for c in range(3):
-                    y[n + c] += rest[c]
-                    z[n + c] += shift[c]
-                n += 3
-            for c in range(3):
-                y[n + c] += moment[c]
-                z[n + c] += turn[c]
-            force, moment = rest, ZERO
-        moment = plus(moment, cross(get3(here.arm), force))
+                    y[r, k + c] += moments[3 * r + c]
+                    z[r, k + c] += turn[3 * r + c]
+            moments = rows_crossed(get3(here.arm), forces)
         i = link.parent
 
 
 @kernel
 def push_generalized(links, work, tau, z):
-    """Run generalized forces tau (nv,) inward through the factors: fill z (nv,) = D^-1 (what is left of them)."""
+    """Run generalized forces tau (nv,) inward through the factors: fill z (nv,) = D^-1 (what is left of them).
+
+    z has its entries in the order of the links' columns, those of ball joints in world axes.
+    """
     for i in range(links.shape[0]):
         put3(work[i].delta_alpha, ZERO)  # here: the moment that children pass on
         put3(work[i].delta_acceleration, ZERO)
     for i in range(links.shape[0] - 1, -1, -1):
         link, here = links[i], work[i]
         moment, force = get3(here.delta_alpha), get3(here.delta_acceleration)
-        n = link.v
+        n, k = link.v, link.column
         if link.kind == REVOLUTE or link.kind == PRISMATIC:
             share = here.D * (tau[n] + dot(get3(here.axis), moment if link.kind == REVOLUTE else force))
-            z[n] = share
+            z[k] = share
             moment = minus(moment, scale(share, get3(here.U_moment)))
             force = minus(force, scale(share, get3(here.U_force)))
         else:
-            first = n + 3 if link.kind == FREE else n
+            offset = 3 if link.kind == FREE else 0
+            first = n + offset
             torque = times(get9(here.rotation), (tau[first], tau[first + 1], tau[first + 2]))
             turn = plus(torque, moment)
             local = symmetric_times(get6(here.J_inverse), turn)
             for c in range(3):
-                z[first + c] = local[c]
+                z[k + offset + c] = local[c]
             force = minus(force, transposed_times(get9(here.K), turn))
             moment = scale(-1.0, torque)
             if link.kind == FREE:
                 rest = symmetric_times(get6(here.M_inverse), plus((tau[n], tau[n + 1], tau[n + 2]), force))
                 for c in range(3):
-                    z[n + c] = rest[c]
+                    z[k + c] = rest[c]
         if link.parent >= 0:
             up = work[link.parent]
             put3(up.delta_alpha, plus(get3(up.delta_alpha), plus(moment, cross(get3(here.arm), force))))
@@ -334,9 +377,9 @@ def pull(links, work, z, vdot):
             up = work[link.parent]
             alpha = get3(up.delta_alpha)
             acceleration = plus(get3(up.delta_acceleration), cross(alpha, get3(here.arm)))
-        n = link.v
+        n, k = link.v, link.column
         if link.kind == REVOLUTE or link.kind == PRISMATIC:
-            rate = z[n] - here.D * (dot(get3(here.U_moment), alpha) + dot(get3(here.U_force), acceleration))
+            rate = z[k] - here.D * (dot(get3(here.U_moment), alpha) + dot(get3(here.U_force), acceleration))
             vdot[n] = rate
             if link.kind == REVOLUTE:
                 alpha = plus(alpha, scale(rate, get3(here.axis)))
@@ -344,10 +387,10 @@ def pull(links, work, z, vdot):
                 acceleration = plus(acceleration, scale(rate, get3(here.axis)))
         else:
             if link.kind == FREE:
-                acceleration = (z[n], z[n + 1], z[n + 2])
+                acceleration = (z[k], z[k + 1], z[k + 2])
                 vdot[n], vdot[n + 1], vdot[n + 2] = acceleration
-                n += 3
-            total = minus((z[n], z[n + 1], z[n + 2]), times(get9(here.K), acceleration))
+                n, k = n + 3, k + 3
+            total = minus((z[k], z[k + 1], z[k + 2]), times(get9(here.K), acceleration))
             vdot[n], vdot[n + 1], vdot[n + 2] = transposed_times(get9(here.rotation), minus(total, alpha))
             alpha = total
         put3(here.delta_alpha, alpha)

@@ -3,7 +3,9 @@
 Unit forces of all rows run once through the articulated-body factors: Y = their generalized forces, Z = D^-1 Y, so that
 A M^-1 A^T = Y Z^T without A or M ever being formed. Redundant rows leave it singular; the solve is proximal (Carpentier
 2021): regularised by 1e-10 of the mean diagonal and refined, so that motion is exact and multipliers are those of least
-norm. ``rows`` is one array (m, 2 nv + 2 m + 3): Y | Z | A M^-1 A^T | its Cholesky factor | right side | answer | change.
+norm. ``rows`` is one array (m, 2 w + 2 m + 3): Y | Z | A M^-1 A^T | its Cholesky factor | right side | answer | change,
+where w counts the degrees of freedom that the rows move. A row d . (b - a), d fixed on link a, sees b move against link
+a's own point at b: so both forces act at b. The two of a rod act at its ends.
 """
 
 import math
@@ -16,22 +18,24 @@ from physics_prior.dynamics.algebra import (
     get3,
     get9,
     minus,
+    minus9,
     plus,
     put3,
     scale,
     times,
 )
-from physics_prior.dynamics.articulated_body import factorize, pull, push
 from physics_prior.dynamics.arrays import clear
+from physics_prior.dynamics.articulated_body import factorize, pull, push
 from physics_prior.dynamics.kernel import inline_kernel, kernel
-from physics_prior.dynamics.kinematics import move
+from physics_prior.dynamics.kinematics import flow, pose, weigh
 from physics_prior.dynamics.manifold import displace
 
 REGULARISATION = 1e-10  # of the mean diagonal: small steps are not safer near a singular configuration (design eq. 11)
 DEPENDENT = 1e3  # a pivot within this factor of the regularisation belongs to a row that adds nothing
 REFINEMENTS = 3
-POSITION_TOLERANCE = 1e-13  # m: projection stops there
-POSITION_ITERATIONS = 6
+EXACT = 1e-15  # of the right side: refinement stops there
+STEP_TOLERANCE, TOLERANCE = 1e-11, 1e-13  # m: projection after a step, and on demand, stops there
+POSITION_ITERATIONS = 12
 
 
 @inline_kernel
@@ -54,6 +58,7 @@ def place(work, pairs):
             b = plus(get3(on.origin), times(get9(on.rotation), b))
         put3(pair.a, a)
         put3(pair.b, b)
+        put3(pair.hold, a if pair.is_rod else b)
         for row in range(pair.rows):
             d = (pair.directions[3 * row], pair.directions[3 * row + 1], pair.directions[3 * row + 2])
             if pair.is_rod:
@@ -65,173 +70,229 @@ def place(work, pairs):
 
 
 @inline_kernel
-def point_velocity(work, link, point):
+def point_velocity(on, point):
     """Velocity of a world point that moves with a link."""
-    velocity = ZERO
-    if link >= 0:
-        on = work[link]
-        velocity = plus(get3(on.velocity), cross(get3(on.omega), minus(point, get3(on.origin))))
-    return velocity
+    return plus(get3(on.velocity), cross(get3(on.omega), minus(point, get3(on.origin))))
 
 
 @inline_kernel
-def point_acceleration(work, link, point, gravity):
+def point_acceleration(on, point):
     """Acceleration (less gravity) of a world point that moves with a link."""
-    acceleration = (-gravity[0], -gravity[1], -gravity[2])
-    if link >= 0:
-        on = work[link]
-        lever, omega = minus(point, get3(on.origin)), get3(on.omega)
-        turning = plus(cross(get3(on.alpha), lever), cross(omega, cross(omega, lever)))
-        acceleration = plus(get3(on.acceleration), turning)
-    return acceleration
+    lever, omega = minus(point, get3(on.origin)), get3(on.omega)
+    turning = plus(cross(get3(on.alpha), lever), cross(omega, cross(omega, lever)))
+    return plus(get3(on.acceleration), turning)
 
 
 @kernel
 def position_error(pairs, out):
-    """Fill out (m,) with the rows' errors, m; return the largest magnitude. Needs ``place``."""
+    """Fill out (m,) with the rows' errors, m, NEGATED; return the largest magnitude. Needs ``place``."""
     worst = 0.0
     for p in range(pairs.shape[0]):
         pair = pairs[p]
-        gap = minus(get3(pair.b), get3(pair.a))
+        gap = minus(get3(pair.a), get3(pair.b))
         for row in range(pair.rows):
             error = dot(direction(pair, row), gap)
             if pair.is_rod:
-                error -= pair.length
+                error += pair.length
             out[pair.first + row] = error
             worst = max(worst, abs(error))
     return worst
 
 
+@inline_kernel
+def approach(work, pair):
+    """Velocity of point b less that of link a where the force holds it, m/s."""
+    rate = ZERO
+    if pair.link_b >= 0:
+        rate = point_velocity(work[pair.link_b], get3(pair.b))
+    if pair.link_a >= 0:
+        rate = minus(rate, point_velocity(work[pair.link_a], get3(pair.hold)))
+    return rate
+
+
 @kernel
 def velocity_error(work, pairs, out):
-    """Fill out (m,) with the rows' velocities, m/s."""
+    """Fill out (m,) with the rows' velocities, m/s, NEGATED."""
     for p in range(pairs.shape[0]):
         pair = pairs[p]
-        gap_rate = minus(
-            point_velocity(work, pair.link_b, get3(pair.b)), point_velocity(work, pair.link_a, get3(pair.a))
-        )
+        rate = approach(work, pair)
         for row in range(pair.rows):
-            out[pair.first + row] = dot(direction(pair, row), gap_rate)
+            out[pair.first + row] = -dot(direction(pair, row), rate)
+
+
+@inline_kernel
+def relative_acceleration(work, pair, gravity):
+    """Acceleration of point b as link a sees it, but for the turning of a rod, m/s^2."""
+    between = (-gravity[0], -gravity[1], -gravity[2])
+    if pair.link_b >= 0:
+        between = point_acceleration(work[pair.link_b], get3(pair.b))
+    if pair.link_a >= 0:
+        on = work[pair.link_a]
+        between = minus(between, point_acceleration(on, get3(pair.hold)))
+        if not pair.is_rod:
+            between = minus(between, scale(2.0, cross(get3(on.omega), approach(work, pair))))
+    else:
+        between = plus(between, (gravity[0], gravity[1], gravity[2]))
+    return between
 
 
 @kernel
 def acceleration_error(work, pairs, gravity, out):
-    """Fill out (m,) with the rows' accelerations under the links' present ones, m/s^2 (A vdot + Adot v)."""
+    """Fill out (m,) with the rows' accelerations under the links' present ones, m/s^2 (A vdot + Adot v), NEGATED."""
     for p in range(pairs.shape[0]):
         pair = pairs[p]
-        a, b = get3(pair.a), get3(pair.b)
-        gap_acceleration = minus(
-            point_acceleration(work, pair.link_b, b, gravity),
-            point_acceleration(work, pair.link_a, a, gravity),
-        )
+        between = relative_acceleration(work, pair, gravity)
         for row in range(pair.rows):
-            error = dot(direction(pair, row), gap_acceleration)
+            error = dot(direction(pair, row), between)
             if pair.is_rod:
-                gap_rate = minus(point_velocity(work, pair.link_b, b), point_velocity(work, pair.link_a, a))
-                along = dot(direction(pair, row), gap_rate)
-                gap = minus(b, a)
-                error += (dot(gap_rate, gap_rate) - along * along) / math.sqrt(dot(gap, gap))
-            out[pair.first + row] = error
+                rate = approach(work, pair)
+                along = dot(direction(pair, row), rate)
+                gap = minus(get3(pair.b), get3(pair.a))
+                error += (dot(rate, rate) - along * along) / math.sqrt(dot(gap, gap))
+            out[pair.first + row] = -error
+
+
+@inline_kernel
+def width(rows):
+    """The number of degrees of freedom that the rows move."""
+    return (rows.shape[1] - 2 * rows.shape[0] - 3) // 2
 
 
 @kernel
-def assemble(links, work, pairs, nv, rows):
-    """Fill Y, Z, A M^-1 A^T and its regularised Cholesky factor; return the rank. Needs factors and ``place``."""
-    m = rows.shape[0]
+def assemble(links, work, pairs, rows):
+    """Fill Y, Z, A M^-1 A^T and its regularised Cholesky factor; return the rank. Needs factors and ``place``.
+
+    The factor is L D L^T with unit L, here also above the diagonal, in which stands D inverted.
+    """
+    m, w = rows.shape[0], width(rows)
     for p in range(pairs.shape[0]):
         pair = pairs[p]
-        for row in range(pair.rows):
-            r = pair.first + row
-            d = direction(pair, row)
-            clear(rows[r, : 2 * nv])
-            push(links, work, pair.link_b, get3(pair.b), d, 1.0, rows[r, :nv], rows[r, nv : 2 * nv])
-            push(links, work, pair.link_a, get3(pair.a), d, -1.0, rows[r, :nv], rows[r, nv : 2 * nv])
+        first, last = pair.first, pair.first + pair.rows
+        for r in range(first, last):
+            for k in range(2 * w):
+                rows[r, k] = 0.0
+        y, z, d = rows[first:last, :w], rows[first:last, w : 2 * w], get9(pair.d)
+        push(links, work, pair.link_b, get3(pair.b), d, pair.rows, y, z)
+        push(links, work, pair.link_a, get3(pair.hold), minus9(d), pair.rows, y, z)
     trace = 0.0
     for r in range(m):
         for s in range(r + 1):
             total = 0.0
-            for k in range(nv):
-                total += rows[r, k] * rows[s, nv + k]
-            rows[r, 2 * nv + s] = total
-            rows[s, 2 * nv + r] = total
-        trace += rows[r, 2 * nv + r]
+            for k in range(w):
+                total += rows[r, k] * rows[s, w + k]
+            rows[r, 2 * w + s] = total
+            rows[s, 2 * w + r] = total
+        trace += rows[r, 2 * w + r]
     epsilon = REGULARISATION * trace / m
     rank = 0
-    L = rows[:, 2 * nv + m : 2 * nv + 2 * m]
+    S, L = rows[:, 2 * w : 2 * w + m], rows[:, 2 * w + m : 2 * w + 2 * m]
     for r in range(m):
-        for s in range(r + 1):
-            total = rows[r, 2 * nv + s]
-            for k in range(s):
-                total -= L[r, k] * L[s, k]
-            if r == s:
-                total += epsilon
-                if total > DEPENDENT * epsilon:
-                    rank += 1
-                L[r, r] = math.sqrt(max(total, 1e-3 * epsilon))
-            else:
-                L[r, s] = total / L[s, s]
+        for s in range(r, m):
+            L[r, s] = S[r, s]
+        L[r, r] += epsilon
+    for r in range(m):
+        pivot = L[r, r]
+        if pivot > DEPENDENT * epsilon:
+            rank += 1
+        inverse = 1.0 / max(pivot, 1e-3 * epsilon)
+        L[r, r] = inverse
+        for s in range(r + 1, m):
+            factor = L[r, s] * inverse
+            for k in range(s, m):
+                L[s, k] -= factor * L[r, k]
+            L[s, r] = factor
+        for s in range(r + 1, m):
+            L[r, s] = L[s, r]
     return rank
 
 
 @kernel
-def multiply(rows, nv):
+def multiply(rows):
     """Solve A M^-1 A^T answer = right side, proximally; fills the answer, spoils the right side."""
-    m = rows.shape[0]
-    S = rows[:, 2 * nv : 2 * nv + m]
-    L = rows[:, 2 * nv + m : 2 * nv + 2 * m]
-    left = rows[:, 2 * nv + 2 * m]
-    answer = rows[:, 2 * nv + 2 * m + 1]
-    change = rows[:, 2 * nv + 2 * m + 2]
+    m, w = rows.shape[0], width(rows)
+    left, answer, change = 2 * w + 2 * m, 2 * w + 2 * m + 1, 2 * w + 2 * m + 2
+    S, L = 2 * w, 2 * w + m
+    size = 0.0
     for r in range(m):
-        answer[r] = 0.0
+        rows[r, answer] = 0.0
+        size = max(size, abs(rows[r, left]))
     for _ in range(REFINEMENTS):
         for r in range(m):
-            total = left[r]
-            for k in range(r):
-                total -= L[r, k] * change[k]
-            change[r] = total / L[r, r]
-        for r in range(m - 1, -1, -1):
-            total = change[r]
-            for k in range(r + 1, m):
-                total -= L[k, r] * change[k]
-            change[r] = total / L[r, r]
-            answer[r] += change[r]
+            rows[r, change] = rows[r, left]
+        for s in range(m):
+            known = rows[s, change]
+            for r in range(s + 1, m):
+                rows[r, change] -= rows[s, L + r] * known
+        for s in range(m):
+            rows[s, change] *= rows[s, L + s]
+        for s in range(m - 1, -1, -1):
+            known = rows[s, change]
+            rows[s, answer] += known
+            for r in range(s):
+                rows[r, change] -= rows[s, L + r] * known
+        for s in range(m):
+            known = rows[s, change]
+            for r in range(m):
+                rows[r, left] -= rows[s, S + r] * known
+        rest = 0.0
         for r in range(m):
-            total = 0.0
-            for k in range(m):
-                total += S[r, k] * change[k]
-            left[r] -= total
+            rest = max(rest, abs(rows[r, left]))
+        if rest <= EXACT * size:
+            break
 
 
 @kernel
-def respond(links, work, rows, nv, z, vdot):
-    """Fill vdot (nv,) = M^-1 A^T answer, and the links' increments of acceleration."""
-    m = rows.shape[0]
-    answer = rows[:, 2 * nv + 2 * m + 1]
-    for k in range(nv):
-        total = 0.0
-        for r in range(m):
-            total += rows[r, nv + k] * answer[r]
-        z[k] = total
+def respond(links, work, rows, z, vdot):
+    """Fill vdot (nv,) = M^-1 A^T answer, and the links' increments of acceleration. z (nv,) is scratch."""
+    m, w = rows.shape[0], width(rows)
+    answer = rows[:, 2 * w + 2 * m + 1]
+    clear(z)
+    for r in range(m):
+        known = answer[r]
+        for k in range(w):
+            z[k] += rows[r, w + k] * known
     pull(links, work, z, vdot)
 
 
 @kernel
-def constrain_acceleration(links, work, pairs, rows, gravity, vdot, spare):
-    """Add constraint forces to free accelerations: vdot (nv,) and the links'; fill pair.force; return the rank.
-
-    Needs ``accelerate``. The system is design eq. 4 with f_c = +A^T lambda, so that pair.force acts ON link b.
-    spare (2, nv) is scratch.
-    """
-    nv, m = vdot.shape[0], rows.shape[0]
+def refresh(links, work, pairs, rows, known, q):
+    """Have the factors and rows of q (nq,) in the workspace, if they are not there yet; return the rank."""
+    nq = q.shape[0]
+    if work[0].factored:
+        same = True
+        for k in range(nq):
+            same = same and known[k] == q[k]
+        if same:
+            return int(known[nq])
+    pose(links, work, q)
     place(work, pairs)
-    rank = assemble(links, work, pairs, nv, rows)
-    right = rows[:, 2 * nv + 2 * m]
-    acceleration_error(work, pairs, gravity, right)
-    for r in range(m):
-        right[r] = -right[r]
-    multiply(rows, nv)
-    respond(links, work, rows, nv, spare[0], spare[1])
+    return complete(links, work, pairs, rows, known, q)
+
+
+@kernel
+def complete(links, work, pairs, rows, known, q):
+    """Fill the factors and rows of q (nq,), poses and pairs being there; return the rank."""
+    weigh(links, work)
+    factorize(links, work)
+    rank = assemble(links, work, pairs, rows)
+    for k in range(q.shape[0]):
+        known[k] = q[k]
+    known[q.shape[0]] = rank
+    work[0].factored = 1
+    return rank
+
+
+@kernel
+def constrain_acceleration(links, work, pairs, rows, gravity, vdot, spare):
+    """Add constraint forces to free accelerations: vdot (nv,) and the links'; fill pair.force.
+
+    Needs ``refresh`` and ``accelerate``. The system is design eq. 4 with f_c = +A^T lambda, so that pair.force acts ON link
+    b. spare (2, nv) is scratch.
+    """
+    nv, m, w = vdot.shape[0], rows.shape[0], width(rows)
+    acceleration_error(work, pairs, gravity, rows[:, 2 * w + 2 * m])
+    multiply(rows)
+    respond(links, work, rows, spare[0], spare[1])
     for k in range(nv):
         vdot[k] += spare[1, k]
     for i in range(links.shape[0]):
@@ -242,9 +303,8 @@ def constrain_acceleration(links, work, pairs, rows, gravity, vdot, spare):
         pair = pairs[p]
         force = ZERO
         for row in range(pair.rows):
-            force = plus(force, scale(rows[pair.first + row, 2 * nv + 2 * m + 1], direction(pair, row)))
+            force = plus(force, scale(rows[pair.first + row, 2 * w + 2 * m + 1], direction(pair, row)))
         put3(pair.force, force)
-    return rank
 
 
 @kernel
@@ -261,36 +321,43 @@ def load_links(work, pairs):
             on = work[pair.link_a]
             back = scale(-1.0, force)
             add3(on.force, back)
-            add3(on.moment, cross(minus(get3(pair.a), get3(on.origin)), back))
+            add3(on.moment, cross(minus(get3(pair.hold), get3(on.origin)), back))
 
 
 @kernel
-def project(links, work, pairs, rows, q, v, spare):
+def project(links, work, pairs, rows, known, q, v, spare, tolerance):
     """Put q (nq,) and v (nv,) back onto the constraints in the mass metric; return the position error left, m.
 
-    q moves by -M^-1 A^T (A M^-1 A^T)^-1 e until e is gone, v by the same map of A v (design eq. 11). spare (2, nv).
+    q moves by -M^-1 A^T (A M^-1 A^T)^-1 e until e is within tolerance, v by the same map of A v (design eq. 11). The factors of a
+    configuration nearby, which the workspace must hold, serve q as long as they make e ten times smaller (simplified
+    Newton's method); the velocity has those of the final q, and the next step finds them there. spare (2, nv).
     """
-    nv, m = v.shape[0], rows.shape[0]
-    right = rows[:, 2 * nv + 2 * m]
-    worst = 0.0
+    nv, m, w = v.shape[0], rows.shape[0], width(rows)
+    right = rows[:, 2 * w + 2 * m]
+    before, exact = math.inf, False
+    pose(links, work, q)
+    place(work, pairs)
+    error = position_error(pairs, right)
     for _ in range(POSITION_ITERATIONS):
-        move(links, work, q, v)
-        factorize(links, work)
-        place(work, pairs)
-        assemble(links, work, pairs, nv, rows)
-        worst = position_error(pairs, right)
-        if worst <= POSITION_TOLERANCE:
+        if error <= tolerance:
             break
-        for r in range(m):
-            right[r] = -right[r]
-        multiply(rows, nv)
-        respond(links, work, rows, nv, spare[0], spare[1])
+        slow = error > 0.1 * before
+        if slow:
+            if exact and error > 0.5 * before:
+                break
+            complete(links, work, pairs, rows, known, q)
+        before, exact = error, slow
+        multiply(rows)
+        respond(links, work, rows, spare[0], spare[1])
         displace(links, q, spare[1], q)
+        pose(links, work, q)
+        place(work, pairs)
+        error = position_error(pairs, right)
+    complete(links, work, pairs, rows, known, q)
+    flow(links, work, v)
     velocity_error(work, pairs, right)
-    for r in range(m):
-        right[r] = -right[r]
-    multiply(rows, nv)
-    respond(links, work, rows, nv, spare[0], spare[1])
+    multiply(rows)
+    respond(links, work, rows, spare[0], spare[1])
     for k in range(nv):
         v[k] += spare[1, k]
-    return worst
+    return error

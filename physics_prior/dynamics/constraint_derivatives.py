@@ -1,6 +1,6 @@
 """Analytic derivatives of point pairs: of their Jacobian, of their accelerations and of the forces they transmit.
 
-Of a point p on a link, moved along a freedom S by the tangent of q (derivation: docs/equations.md):
+Of a link moved along a freedom S by the tangent of q (derivation: docs/kernels.md):
     dV = S x V + psi_dot,  dA = S x A + psi_dot x V + psi_ddot,  and by v:  dV = S,  dA = S_dot + S x V + psi_dot.
 """
 
@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
-from physics_prior.dynamics.algebra import add3, cross, dot, get3, minus, plus, scale
-from physics_prior.dynamics.constraint import direction, point_acceleration, point_velocity
+from physics_prior.dynamics.algebra import add3, cross, dot, get3, minus, plus, put3, scale
+from physics_prior.dynamics.constraint import approach, direction, relative_acceleration
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import freedoms
 from physics_prior.dynamics.records import FREE
@@ -17,12 +17,14 @@ from physics_prior.dynamics.spatial import add, at_point, cross_motion, get_spat
 
 GAP = np.dtype(
     [
-        ("point", "f8", (2, 3)),  # of points a and b by the tangent of q
-        ("gap", "f8", 3),  # of b - a
-        ("rate_q", "f8", 3),  # of its rate by the tangent of q (by v: gap)
-        ("acceleration_q", "f8", 3),  # of its second rate
+        ("moved", "f8", 3),  # of point b by the tangent of q
+        ("held", "f8", 3),  # of where the force holds link a
+        ("gap", "f8", 3),  # velocity of b against link a by v
+        ("rate_q", "f8", 3),  # ... by the tangent of q
+        ("acceleration_q", "f8", 3),  # of the relative acceleration
         ("acceleration_v", "f8", 3),
-        ("turn", "f8", 3),  # angular motion of the directions
+        ("turn", "f8", 3),  # angular velocity of link a by v: the directions turn with it
+        ("turn_q", "f8", 3),  # ... by the tangent of q
     ],
     align=True,
 )
@@ -31,51 +33,75 @@ GAP = np.dtype(
 
 @kernel
 def differentiate_gap(links, work, freedom_records, composites, pair, gaps):
-    """Fill gaps (nv,): the derivatives of b - a and its rates by every degree of freedom; needs ``sweep``, ``place``."""
+    """Fill gaps (nv,): the derivatives of where a pair's points are and how they move; needs ``sweep``, ``place``."""
     for k in range(gaps.shape[0]):
         gap = gaps[k]
         for c in range(3):
-            gap.point[0, c] = 0.0
-            gap.point[1, c] = 0.0
+            gap.moved[c] = 0.0
+            gap.held[c] = 0.0
             gap.gap[c] = 0.0
             gap.rate_q[c] = 0.0
             gap.acceleration_q[c] = 0.0
             gap.acceleration_v[c] = 0.0
             gap.turn[c] = 0.0
+            gap.turn_q[c] = 0.0
     base = get3(work[0].origin)
-    for side in range(2):
-        sign = 2.0 * side - 1.0
-        i = pair.link_b if side == 1 else pair.link_a
-        if i < 0:
-            continue
-        p = minus(get3(pair.b) if side == 1 else get3(pair.a), base)
-        V, A = get_spatial(composites[i].V), get_spatial(composites[i].A)
+    _differentiate_side(links, freedom_records, composites, pair, gaps, 1.0, pair.link_b, minus(get3(pair.b), base))
+    if not pair.is_rod:
+        # the force holds link a where b is
+        for k in range(gaps.shape[0]):
+            put3(gaps[k].held, get3(gaps[k].moved))
+    i = pair.link_a
+    if i < 0:
+        return
+    _differentiate_side(links, freedom_records, composites, pair, gaps, -1.0, i, minus(get3(pair.hold), base))
+    if not pair.is_rod:
+        rate, omega = approach(work, pair), get3(work[i].omega)
+        for k in range(gaps.shape[0]):
+            gap = gaps[k]
+            by_q = plus(cross(get3(gap.turn_q), rate), cross(omega, get3(gap.rate_q)))
+            by_v = plus(cross(get3(gap.turn), rate), cross(omega, get3(gap.gap)))
+            add3(gap.acceleration_q, scale(-2.0, by_q))
+            add3(gap.acceleration_v, scale(-2.0, by_v))
+
+
+@inline_kernel
+def _differentiate_side(links, freedom_records, composites, pair, gaps, sign, link, p):
+    """Add what the motion of one side's link does at its point p, and how the point moves."""
+    if link >= 0:
+        V, A = get_spatial(composites[link].V), get_spatial(composites[link].A)
         omega, velocity = V[0], at_point(V, p)
+        i = link
         while i >= 0:
             for c in range(freedoms(links[i].kind)):
                 k = links[i].v + c
                 record, gap = freedom_records[k], gaps[k]
                 S, psi_dot = get_spatial(record.S), get_spatial(record.psi_dot)
-                moved = at_point(S, p)
                 SxV = cross_motion(S, V)
                 V_q = add(SxV, psi_dot)
                 A_q = add(add(cross_motion(S, A), cross_motion(psi_dot, V)), get_spatial(record.psi_ddot))
                 A_v = add(add(get_spatial(record.S_dot), SxV), psi_dot)
-                velocity_q = plus(at_point(V_q, p), cross(omega, moved))
-                by_q = plus(
-                    plus(at_point(A_q, p), cross(A[0], moved)),
-                    plus(cross(V_q[0], velocity), cross(omega, velocity_q)),
-                )
+                moved, velocity_q = at_point(S, p), at_point(V_q, p)
+                by_q = plus(at_point(A_q, p), plus(cross(V_q[0], velocity), cross(omega, velocity_q)))
                 by_v = plus(at_point(A_v, p), plus(cross(S[0], velocity), cross(omega, moved)))
-                for e in range(3):
-                    gap.point[side, e] = moved[e]
                 add3(gap.gap, scale(sign, moved))
                 add3(gap.rate_q, scale(sign, velocity_q))
                 add3(gap.acceleration_q, scale(sign, by_q))
                 add3(gap.acceleration_v, scale(sign, by_v))
-                if side == 0:
-                    add3(gap.turn, S[0])
+                if sign > 0.0:
+                    put3(gap.moved, moved)
+                else:
+                    put3(gap.turn, S[0])
+                    put3(gap.turn_q, V_q[0])
+                    if pair.is_rod:
+                        put3(gap.held, moved)
             i = links[i].parent
+        for k in range(gaps.shape[0]):
+            gap = gaps[k]
+            moved = get3(gap.moved) if sign > 0.0 else get3(gap.held)
+            turned_point = cross(omega, moved)
+            add3(gap.rate_q, scale(sign, turned_point))
+            add3(gap.acceleration_q, scale(sign, plus(cross(A[0], moved), cross(omega, turned_point))))
 
 
 @inline_kernel
@@ -84,8 +110,8 @@ def turned(pair, row, gap):
     d = direction(pair, row)
     if pair.is_rod:
         between = minus(get3(pair.b), get3(pair.a))
-        along = dot(d, get3(gap.gap))
-        return scale(1.0 / math.sqrt(dot(between, between)), minus(get3(gap.gap), scale(along, d)))
+        change = minus(get3(gap.moved), get3(gap.held))
+        return scale(1.0 / math.sqrt(dot(between, between)), minus(change, scale(dot(d, change), d)))
     return cross(get3(gap.turn), d)
 
 
@@ -100,13 +126,8 @@ def differentiate_rows(links, work, pairs, freedom_records, composites, gravity,
     for p in range(pairs.shape[0]):
         pair = pairs[p]
         differentiate_gap(links, work, freedom_records, composites, pair, gaps)
-        a, b = get3(pair.a), get3(pair.b)
-        rate = minus(point_velocity(work, pair.link_b, b), point_velocity(work, pair.link_a, a))
-        acceleration = minus(
-            point_acceleration(work, pair.link_b, b, gravity),
-            point_acceleration(work, pair.link_a, a, gravity),
-        )
-        between = minus(b, a)
+        rate, acceleration = approach(work, pair), relative_acceleration(work, pair, gravity)
+        between = minus(get3(pair.b), get3(pair.a))
         distance = math.sqrt(dot(between, between))
         for row in range(pair.rows):
             r, d = pair.first + row, direction(pair, row)
@@ -135,13 +156,13 @@ def _differentiate_transmission(links, pair, freedom_records, gaps, force, tau_q
     for side in range(2):
         sign = 2.0 * side - 1.0
         i = pair.link_b if side == 1 else pair.link_a
-        p = minus(get3(pair.b) if side == 1 else get3(pair.a), base)
+        p = minus(get3(pair.b) if side == 1 else get3(pair.hold), base)
         pushed = scale(sign, force)
         while i >= 0:
             for c in range(freedoms(links[i].kind)):
                 k = links[i].v + c
                 S = get_spatial(freedom_records[k].S)
-                here = gaps[k].point[side]
+                here = at_point(S, p)
                 for n in range(nv):
                     gap = gaps[n]
                     if pair.is_rod:
@@ -149,8 +170,8 @@ def _differentiate_transmission(links, pair, freedom_records, gaps, force, tau_q
                         force_q = scale(sign * along, turned(pair, 0, gap))
                     else:
                         force_q = cross(get3(gap.turn), pushed)
-                    moved = get3(gap.point[side])
-                    tau_q[k, n] -= dot(get3(here), force_q) + dot(S[0], cross(moved, pushed))
+                    moved = get3(gap.moved) if side == 1 else get3(gap.held)
+                    tau_q[k, n] -= dot(here, force_q) + dot(S[0], cross(moved, pushed))
                 j = i
                 while j >= 0:
                     for e in range(freedoms(links[j].kind)):

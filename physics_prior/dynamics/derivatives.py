@@ -7,9 +7,9 @@ counts as a translation that carries a ball joint. Forward dynamics follow from 
 import numpy as np
 
 from physics_prior.dynamics.algebra import cross, get3, get6, minus, plus, scale, symmetric_times
+from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.articulated_body import pull, push_generalized
 from physics_prior.dynamics.gyroscopic import middle_correction
-from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import freedom, freedoms
 from physics_prior.dynamics.records import FREE, SPHERICAL

@@ -7,6 +7,7 @@ solution is what the semi-implicit step applies to links on ball and free joints
 
 from physics_prior.dynamics.algebra import (
     cross,
+    dot,
     full,
     get3,
     get6,
@@ -14,14 +15,17 @@ from physics_prior.dynamics.algebra import (
     plus,
     put3,
     scale,
+    scale9,
     solve3,
+    sum9,
     symmetric_times,
     times,
 )
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import FREE, SPHERICAL
 
-NEWTON_ITERATIONS = 4
+NEWTON_ITERATIONS = 20
+NEWTON_TOLERANCE = 1e-24  # of the square of the angular velocity: the next change is smaller by step * change
 
 
 @inline_kernel
@@ -29,48 +33,35 @@ def spin_matrix(inertia, omega):
     """The derivative of omega x I omega by omega: [omega]x I - [I omega]x, a 9-tuple."""
     i = full(inertia)
     x, y, z = omega
-    l, m, n = symmetric_times(inertia, omega)
+    a, b, c = symmetric_times(inertia, omega)
     return (
         y * i[6] - z * i[3],
-        y * i[7] - z * i[4] + n,
-        y * i[8] - z * i[5] - m,
-        z * i[0] - x * i[6] - n,
+        y * i[7] - z * i[4] + c,
+        y * i[8] - z * i[5] - b,
+        z * i[0] - x * i[6] - c,
         z * i[1] - x * i[7],
-        z * i[2] - x * i[8] + l,
-        x * i[3] - y * i[0] + m,
-        x * i[4] - y * i[1] - l,
+        z * i[2] - x * i[8] + a,
+        x * i[3] - y * i[0] + b,
+        x * i[4] - y * i[1] - a,
         x * i[5] - y * i[2],
     )
 
 
 @inline_kernel
-def sum9(a, s, b):
-    """The matrix a + s b."""
-    return (
-        a[0] + s * b[0],
-        a[1] + s * b[1],
-        a[2] + s * b[2],
-        a[3] + s * b[3],
-        a[4] + s * b[4],
-        a[5] + s * b[5],
-        a[6] + s * b[6],
-        a[7] + s * b[7],
-        a[8] + s * b[8],
-    )
-
-
-@inline_kernel
 def middle_rate(inertia, omega, step):
-    """The angular velocity in the middle of a free body's step, by Newton's method."""
+    """The angular velocity in the middle of a free body's step, by Newton's method with its first slope."""
     after = omega
+    slope = sum9(full(inertia), scale9(0.5 * step, spin_matrix(inertia, omega)))
     for _ in range(NEWTON_ITERATIONS):
         middle = scale(0.5, plus(omega, after))
         error = plus(
             symmetric_times(inertia, minus(after, omega)),
             scale(step, cross(middle, symmetric_times(inertia, middle))),
         )
-        slope = sum9(full(inertia), 0.5 * step, spin_matrix(inertia, middle))
-        after = minus(after, solve3(slope, error))
+        change = solve3(slope, error)
+        after = minus(after, change)
+        if dot(change, change) <= NEWTON_TOLERANCE * dot(after, after):
+            break
     return scale(0.5, plus(omega, after))
 
 
@@ -93,7 +84,7 @@ def middle_correction(inertia, omega, step, direction):
     """
     middle = middle_rate(inertia, omega, step)
     K = spin_matrix(inertia, middle)
-    slope = sum9(full(inertia), 0.5 * step, K)
+    slope = sum9(full(inertia), scale9(0.5 * step, K))
     right = minus(
         symmetric_times(inertia, direction),
         scale(

@@ -1,5 +1,7 @@
 """Kinematics: where every link is, how it moves and what its velocity alone adds to its acceleration."""
 
+import math
+
 from physics_prior.dynamics.algebra import (
     IDENTITY,
     ZERO,
@@ -15,7 +17,6 @@ from physics_prior.dynamics.algebra import (
     put6,
     put9,
     rotated_inertia,
-    rotation_about,
     rotation_of,
     scale,
     symmetric_times,
@@ -33,61 +34,119 @@ def move(links, work, q, v):
     World axes throughout, each link about its own joint, so that inertias shift but never rotate. External forces are
     set to zero. Source: Featherstone 2008, ch. 4, with accelerations of points instead of spatial ones.
     """
+    pose(links, work, q)
+    weigh(links, work)
+    flow(links, work, v)
+
+
+@kernel
+def pose(links, work, q):
+    """Fill where the links are."""
+    work[0].factored = 0
     for i in range(links.shape[0]):
         link, here = links[i], work[i]
-        R, origin, omega, velocity = IDENTITY, ZERO, ZERO, ZERO
-        if link.parent >= 0:
-            up = work[link.parent]
-            R, origin = get9(up.rotation), get3(up.origin)
-            omega, velocity = get3(up.omega), get3(up.velocity)
-        arm = times(R, get3(link.position))
-        R = product(R, get9(link.placement))
-        angular = ZERO
-        linear = cross(omega, cross(omega, arm))
-        spin = ZERO
-        slide = ZERO
-        k, n = link.q, link.v
-        if link.kind == REVOLUTE:
-            R = product(R, rotation_about(get3(link.axis), q[k]))
-            axis = times(R, get3(link.axis))
-            put3(here.axis, axis)
-            spin = scale(v[n], axis)
-            angular = cross(omega, spin)
-        elif link.kind == PRISMATIC:
-            axis = times(R, get3(link.axis))
-            put3(here.axis, axis)
-            arm = plus(arm, scale(q[k], axis))
-            slide = scale(v[n], axis)
-            linear = plus(cross(omega, cross(omega, arm)), scale(2.0, cross(omega, slide)))
-        elif link.kind == SPHERICAL:
-            R = product(R, rotation_of(q[k], q[k + 1], q[k + 2], q[k + 3]))
-            spin = times(R, (v[n], v[n + 1], v[n + 2]))
-            angular = cross(omega, spin)
-        elif link.kind == FREE:
+        kind, k = link.kind, link.q
+        if kind == FREE:
             arm = (q[k], q[k + 1], q[k + 2])
+            origin = arm
             R = rotation_of(q[k + 3], q[k + 4], q[k + 5], q[k + 6])
-            slide = (v[n], v[n + 1], v[n + 2])
-            spin = times(R, (v[n + 3], v[n + 4], v[n + 5]))
+        else:
+            R, origin = IDENTITY, ZERO
+            if link.parent >= 0:
+                up = work[link.parent]
+                R, origin = get9(up.rotation), get3(up.origin)
+            arm = times(R, get3(link.position))
+            if link.turned:
+                R = product(R, get9(link.placement))
+            if kind == SPHERICAL:
+                R = product(R, rotation_of(q[k], q[k + 1], q[k + 2], q[k + 3]))
+            else:
+                axis = times(R, get3(link.axis))
+                put3(here.axis, axis)
+                if kind == REVOLUTE:
+                    R = turned_about(R, get3(link.axis), axis, q[k])
+                elif kind == PRISMATIC:
+                    arm = plus(arm, scale(q[k], axis))
+            origin = plus(origin, arm)
         put9(here.rotation, R)
         put3(here.arm, arm)
-        put3(here.origin, plus(origin, arm))
-        put3(here.velocity, plus(plus(velocity, cross(omega, arm)), slide))
-        omega = plus(omega, spin)
+        put3(here.origin, origin)
+
+
+@kernel
+def weigh(links, work):
+    """Fill centres of mass and inertias of the links in world axes; needs ``pose``."""
+    for i in range(links.shape[0]):
+        link, here = links[i], work[i]
+        R = get9(here.rotation)
+        put3(here.center, times(R, get3(link.center)))
+        put6(here.inertia, rotated_inertia(R, get6(link.inertia)))
+
+
+@kernel
+def flow(links, work, v):
+    """Fill velocities, what they add to accelerations, and gyroscopic torques; needs ``pose`` and ``weigh``."""
+    for i in range(links.shape[0]):
+        link, here = links[i], work[i]
+        kind, n = link.kind, link.v
+        omega, velocity = ZERO, ZERO
+        arm = get3(here.arm)
+        angular, linear = ZERO, ZERO
+        if link.parent >= 0:
+            up = work[link.parent]
+            omega, velocity = get3(up.omega), get3(up.velocity)
+            carried = cross(omega, arm)
+            velocity = plus(velocity, carried)
+            linear = cross(omega, carried)
+        if kind == REVOLUTE:
+            spin = scale(v[n], get3(here.axis))
+            angular = cross(omega, spin)
+            omega = plus(omega, spin)
+        elif kind == PRISMATIC:
+            slide = scale(v[n], get3(here.axis))
+            linear = plus(linear, scale(2.0, cross(omega, slide)))
+            velocity = plus(velocity, slide)
+        elif kind == SPHERICAL:
+            spin = times(get9(here.rotation), (v[n], v[n + 1], v[n + 2]))
+            angular = cross(omega, spin)
+            omega = plus(omega, spin)
+        elif kind == FREE:
+            velocity = (v[n], v[n + 1], v[n + 2])
+            omega = times(get9(here.rotation), (v[n + 3], v[n + 4], v[n + 5]))
         put3(here.omega, omega)
+        put3(here.velocity, velocity)
         put3(here.coriolis_angular, angular)
         put3(here.coriolis_linear, linear)
-        put3(here.center, times(R, get3(link.center)))
-        inertia = rotated_inertia(R, get6(link.inertia))
-        put6(here.inertia, inertia)
-        put3(here.gyroscopic, cross(omega, symmetric_times(inertia, omega)))
+        put3(here.gyroscopic, cross(omega, symmetric_times(get6(here.inertia), omega)))
         put3(here.moment, ZERO)
         put3(here.force, ZERO)
 
 
 @inline_kernel
+def turned_about(R, local, axis, angle):
+    """The rotation matrix R turned by an angle about a unit axis, ``local`` in R's axes and ``axis`` = R local (Rodrigues)."""
+    s, c = math.sin(angle), math.cos(angle)
+    k = scale(1.0 - c, axis)
+    a = cross((R[0], R[1], R[2]), local)
+    b = cross((R[3], R[4], R[5]), local)
+    d = cross((R[6], R[7], R[8]), local)
+    return (
+        c * R[0] + k[0] * local[0] + s * a[0],
+        c * R[1] + k[0] * local[1] + s * a[1],
+        c * R[2] + k[0] * local[2] + s * a[2],
+        c * R[3] + k[1] * local[0] + s * b[0],
+        c * R[4] + k[1] * local[1] + s * b[1],
+        c * R[5] + k[1] * local[2] + s * b[2],
+        c * R[6] + k[2] * local[0] + s * d[0],
+        c * R[7] + k[2] * local[1] + s * d[1],
+        c * R[8] + k[2] * local[2] + s * d[2],
+    )
+
+
+@inline_kernel
 def freedoms(kind):
     """Number of degrees of freedom of a joint."""
-    return 1 if kind == REVOLUTE or kind == PRISMATIC else (6 if kind == FREE else 3)
+    return 1 if kind in (REVOLUTE, PRISMATIC) else (6 if kind == FREE else 3)
 
 
 @inline_kernel

@@ -19,8 +19,8 @@ from physics_prior.dynamics.algebra import (
     times,
     transposed_times,
 )
-from physics_prior.dynamics.articulated_body import rigid_inertias, shift_to_parent
 from physics_prior.dynamics.arrays import clear
+from physics_prior.dynamics.articulated_body import rigid_inertias, shift_to_parent
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kinematics import freedom, freedoms
 from physics_prior.dynamics.records import FREE, PRISMATIC, REVOLUTE

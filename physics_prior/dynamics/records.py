@@ -14,6 +14,8 @@ LINK = np.dtype(
         ("kind", "i8"),  # JointKind
         ("q", "i8"),  # first coordinate in q
         ("v", "i8"),  # first degree of freedom in v
+        ("column", "i8"),  # the same in the order of constraint rows: what constraints move comes first
+        ("turned", "i8"),  # whether the placement turns at all
         ("axis", "f8", 3),  # joint axis in the link frame
         ("position", "f8", 3),  # joint in the parent link's frame, m
         ("placement", "f8", 9),  # rotation matrix, link to parent link at zero
@@ -36,6 +38,7 @@ WORK = np.dtype(
         ("velocity", "f8", 3),  # of the origin, world, m/s
         ("coriolis_angular", "f8", 3),  # what velocities alone add to the angular acceleration
         ("coriolis_linear", "f8", 3),  # ... and to the acceleration of the origin
+        ("factored", "i8"),  # of the first link: whether factors and rows are those of these poses
         ("inertia", "f8", 6),  # of the link about its centre of mass, world axes
         ("gyroscopic", "f8", 3),  # torque omega x I omega, or its midpoint form, world
         ("moment", "f8", 3),  # external moment about the origin, world, N m
@@ -74,6 +77,7 @@ PAIR = np.dtype(
         ("directions", "f8", 9),  # rows of unit vectors in link a's frame
         ("a", "f8", 3),  # point a, world, m
         ("b", "f8", 3),
+        ("hold", "f8", 3),  # where the force acts on link a: at b, but at a for a rod
         ("d", "f8", 9),  # rows of unit vectors, world
         ("force", "f8", 3),  # of the constraint ON link b at point b, world, N
     ],
@@ -82,18 +86,29 @@ PAIR = np.dtype(
 """One point pair: its constants and what the kernels compute for it."""
 
 
-def link_records(tree: Tree) -> np.ndarray:
-    """The tree's moving parts as LINK records (N,)."""
+def link_records(tree: Tree, pairs: np.ndarray) -> np.ndarray:
+    """The tree's moving parts as LINK records (N,), held by PAIR records (P,)."""
     records = np.zeros(len(tree.links), dtype=LINK)
+    moved = _moved_links(tree, pairs)
+    column = 0
+    for i in sorted(range(len(records)), key=lambda i: i not in moved):
+        records[i]["column"] = column
+        column += tree.links[i].joint.nv
     for record, link in zip(records, tree.links, strict=True):
         inertia = link.mass_properties.inertia
         record["parent"], record["kind"] = link.parent, int(link.joint.kind)
         record["q"], record["v"] = link.q.start, link.v.start
         record["axis"], record["position"] = link.joint.axis, link.joint.position
         record["placement"] = rotations.matrix_from_quaternion(link.joint.orientation).ravel()
+        record["turned"] = not np.array_equal(record["placement"], np.eye(3).ravel())
         record["mass"], record["center"] = link.mass_properties.mass, link.mass_properties.center_of_mass
         record["inertia"] = inertia[np.triu_indices(3)]
     return records
+
+
+def moved_freedoms(tree: Tree, pairs: np.ndarray) -> int:
+    """Number of degrees of freedom that PAIR records (P,) move: the width of the constraint rows."""
+    return sum(tree.links[i].joint.nv for i in _moved_links(tree, pairs))
 
 
 def pair_records(tree: Tree, pairs: list[PointPair]) -> np.ndarray:
@@ -116,3 +131,13 @@ def _on_link(tree: Tree, anchor: Anchor) -> tuple[int, np.ndarray, np.ndarray]:
     frame = tree.frame(anchor.part)
     R = rotations.matrix_from_quaternion(frame.orientation)
     return frame.link, frame.position + R @ anchor.point, R
+
+
+def _moved_links(tree: Tree, pairs: np.ndarray) -> set[int]:
+    """The links between the world and any point of the pairs."""
+    moved: set[int] = set()
+    for i in [*pairs["link_a"], *pairs["link_b"]]:
+        while i >= 0:
+            moved.add(int(i))
+            i = tree.links[i].parent
+    return moved

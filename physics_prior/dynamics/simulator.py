@@ -8,9 +8,8 @@ import numpy as np
 from physics_prior import rotations
 from physics_prior.dynamics import constraint, kinematics, manifold, newton_euler
 from physics_prior.dynamics.compose import GRAVITY, INTEGRATORS, RUNGE_KUTTA, pack_parameters, step_module
-from physics_prior.dynamics.constraint_derivatives import GAP
-from physics_prior.dynamics.derivatives import COMPOSITE, FREEDOM
-from physics_prior.dynamics.records import WORK, link_records, pair_records
+from physics_prior.dynamics.memory import Memory, tangent_memory
+from physics_prior.dynamics.records import link_records, moved_freedoms, pair_records
 from physics_prior.effects.effect import Effect, PointPair
 from physics_prior.errors import ModelError, SimulationError
 from physics_prior.model import Tree
@@ -60,24 +59,29 @@ class Simulator:
         self.nq, self.nv = tree.nq, tree.nv
         self.rows = sum(1 if pair.length is not None else len(pair.directions) for pair in pairs)
         self.rank = 0
-        self._links, self._pairs = link_records(tree), pair_records(tree, pairs)
-        self._work = np.zeros(len(self._links), dtype=WORK)
+        records = pair_records(tree, pairs)
+        memory = Memory(
+            link_records(tree, records),
+            records,
+            moved_freedoms(tree, records),
+            pack_parameters(tree, effects),
+            self.nq,
+            self.nv,
+        )
+        self._memory, self._links, self._work, self._pairs = memory, memory.links, memory.work, memory.pairs
+        self._gravity = memory.parameters[:GRAVITY]
+        self._step = step_module(effects, bool(pairs), integrator)
         self._rotations, self._origins = self._work["rotation"].reshape(-1, 3, 3), self._work["origin"]
         self._frames: dict[str, tuple[int, np.ndarray, np.ndarray]] = {}
-        self._rows = np.zeros((self.rows, 2 * self.nv + 2 * self.rows + 3))
-        self._parameters = pack_parameters(tree, effects)
-        self._module = step_module(effects, bool(pairs), integrator)
-        self._system = (self._links, self._work, self._pairs, self._rows, self._parameters)
-        self._start, self._scratch = np.zeros(self.nq), np.zeros((9, self.nv))
         self._still, self._vdot = np.zeros(self.nv), np.zeros(self.nv)
-        self._tangent: tuple[np.ndarray, ...] | None = None
+        self._tangent = np.zeros(0)
         self._check_inertia()
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray | None = None) -> np.ndarray:
         """(nv,) vdot at q and v under the effects and generalized forces tau (nv,); fills ``rank``."""
         vdot = np.zeros(self.nv)
         extra = self._still if tau is None else tau
-        self.rank = self._module.evaluate(*self._system, q, v, extra, 0.0, vdot, self._scratch[:3])
+        self.rank = self._step.evaluate(self._memory.array, q, v, extra, 0.0, vdot)
         return vdot
 
     def advance(self, q: np.ndarray, v: np.ndarray, h: float, count: int = 1, tau: np.ndarray | None = None) -> None:
@@ -87,8 +91,8 @@ class Simulator:
             SimulationError: the motion left the numbers (a step far too large for it).
         """
         extra = self._still if tau is None else tau
-        self.rank = self._module.advance(*self._system, q, v, extra, h, count, self._start, self._scratch)
-        if not (np.isfinite(q).all() and np.isfinite(v).all()):
+        self.rank = self._step.advance(self._memory.array, q, v, extra, h, count)
+        if self.rank < 0:
             raise SimulationError(
                 f"the motion is not finite after a step of {h:g} s: a smaller step size or the other integrator may do"
             )
@@ -102,27 +106,18 @@ class Simulator:
         generalized forces of density force_noise (nv,) [N sqrt(s) or N m sqrt(s)] add. Both lie in the tangent space of the
         constraints.
         """
-        nv, m = self.nv, self.rows
-        if self._tangent is None:
-            self._tangent = (
-                np.zeros((2 * nv, nv)),
-                np.zeros((2 * nv + 4 * m, nv)),
-                np.zeros((7, nv, 2 * nv)),
-                np.zeros(nv, dtype=FREEDOM),
-                np.zeros(len(self._links), dtype=COMPOSITE),
-                np.zeros(nv, dtype=GAP),
-            )
-        F, G = np.empty((2 * nv, 2 * nv)), np.empty((2 * nv, 2 * nv))
-        self.rank = self._module.linearise(
-            *self._system, q, v, self._still, h, force_noise, F, G, *self._tangent, self._start, self._scratch
-        )
+        F, G = np.empty((2 * self.nv, 2 * self.nv)), np.empty((2 * self.nv, 2 * self.nv))
+        self.rank = self._step.linearise(self._memory.array, self._tangents(), q, v, self._still, h, force_noise, F, G)
         return F, G
 
     def project(self, q: np.ndarray, v: np.ndarray) -> float:
         """Put q and v onto the constraints in place, in the mass metric; return the position error left, m."""
         if self.rows == 0:
             return 0.0
-        return float(constraint.project(self._links, self._work, self._pairs, self._rows, q, v, self._scratch[:3]))
+        own = self._memory
+        system = (own.links, own.work, own.pairs, own.rows, own.known, q)
+        constraint.refresh(*system)
+        return float(constraint.project(*system, v, own.spare, constraint.TOLERANCE))
 
     def displaced(self, q: np.ndarray, delta: np.ndarray) -> np.ndarray:
         """(nq,) q moved by a tangent vector (nv,), as Tree.integrate does, compiled."""
@@ -134,20 +129,13 @@ class Simulator:
         """Put q and v, and the columns of a factor (2 nv, k) of their errors, onto the constraints, in place."""
         if self.rows:
             self.project(q, v)
-            A, A_q = self.tangent_rows(q, v)
-            self.project(q, v)
-            self._module.project_columns(
-                self._links, self._work, self._pairs, self._rows, A, A_q, factor, self._scratch[:3]
-            )
+            self._step.project_columns(self._memory.array, *self.tangent_rows(q, v), factor)
 
     def tangent_rows(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Constraint Jacobian A (rows, nv) and the derivative of A v by the tangent of q (rows, nv)."""
         A, A_q = np.zeros((self.rows, self.nv)), np.zeros((self.rows, self.nv))
         if self.rows:
-            self.linearise(q.copy(), v.copy(), 1e-6, self._still)
-            assert self._tangent is not None
-            _, matrices, _, freedoms, composites, gaps = self._tangent
-            self._module.tangent_rows(*self._system, q, v, A, A_q, matrices, freedoms, composites, gaps)
+            self._step.tangent_rows(self._memory.array, self._tangents(), q, v, A, A_q)
         return A, A_q
 
     def constraint_error(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -156,7 +144,7 @@ class Simulator:
         self.move(q, v)
         constraint.place(self._work, self._pairs)
         constraint.position_error(self._pairs, out)
-        return out
+        return -out
 
     def move(self, q: np.ndarray, v: np.ndarray) -> None:
         """Bring the kinematics up to date for ``pose``, ``velocity``, ``jacobian`` and ``energy``."""
@@ -196,12 +184,12 @@ class Simulator:
         """(nv,) generalized forces that produce vdot beside gravity; effects that push are not counted in."""
         tau = np.zeros(self.nv)
         self.move(q, v)
-        newton_euler.inverse_dynamics(self._links, self._work, vdot, self._parameters[:GRAVITY], tau)
+        newton_euler.inverse_dynamics(self._links, self._work, vdot, self._gravity, tau)
         return tau
 
     def energy(self) -> float:
         """Kinetic energy plus potential energy in the uniform field, J, zero height at the world's origin; needs ``move``."""
-        return float(kinematics.energy(self._links, self._work, self._parameters[:GRAVITY]))
+        return float(kinematics.energy(self._links, self._work, self._gravity))
 
     def _frame(self, part: str) -> tuple[int, np.ndarray, np.ndarray]:
         """Link, position and rotation on it of a part; ModelError lists the known parts."""
@@ -221,7 +209,7 @@ class Simulator:
         out = np.zeros((len(self.wrench_names), 6))
         count = len(self._links)
         if vdot is None:
-            self.rank = self._module.evaluate(*self._system, q, v, self._still, 0.0, self._vdot, self._scratch[:3])
+            self.rank = self._step.evaluate(self._memory.array, q, v, self._still, 0.0, self._vdot)
             constraint.load_links(self._work, self._pairs)
             for row, (_, first, last) in enumerate(self._labels, start=count):
                 own = self._pairs[first:last]
@@ -230,7 +218,7 @@ class Simulator:
                     out[row, 3:] = np.cross(own["b"] - own["b"][0], own["force"]).sum(axis=0)
         else:
             kinematics.move(self._links, self._work, q, v)
-            newton_euler.spread(self._links, self._work, vdot, self._parameters[:GRAVITY])
+            newton_euler.spread(self._links, self._work, vdot, self._gravity)
         newton_euler.transmit(self._links, self._work)
         out[:count, :3] = self._work["bias_force"]
         out[:count, 3:] = self._work["bias_moment"]
@@ -249,7 +237,13 @@ class Simulator:
     @property
     def effort(self) -> np.ndarray:
         """(nv,) generalized forces of the effects at the last ``acceleration`` or ``wrenches``."""
-        return np.array(self._scratch[2])
+        return np.array(self._memory.spare[2])
+
+    def _tangents(self) -> np.ndarray:
+        """What derivatives need beside the memory, made when first needed."""
+        if not len(self._tangent):
+            self._tangent = tangent_memory(len(self._links), self.rows, self.nv)
+        return self._tangent
 
     def _check_inertia(self) -> None:
         """Refuse joints that move no inertia, in any of a few postures (a point mass on a joint's axis, say)."""

@@ -2,23 +2,29 @@
 
 This file is the step of a scene without force effects and without constraints. For any other scene the composer
 (dynamics/compose.py) writes a copy of it into the kernel cache with the lines marked ``scene`` replaced, so that a
-scene's step holds the effects that it names and nothing else.
-
-``system`` stands for (links, work, pairs, rows, parameters): records of the links, point pairs and constraint rows (see
-records.py, constraint.py), and the numbers of the effects, gravity first.
+scene's step holds the effects that it names and nothing else. ``memory`` is that of memory.py.
 """
 
 import math
 
-from physics_prior.dynamics.articulated_body import accelerate, factorize
 from physics_prior.dynamics.arrays import accumulate, clear, copy
-from physics_prior.dynamics.constraint import constrain_acceleration, multiply, place, project, respond
+from physics_prior.dynamics.articulated_body import accelerate, factorize
+from physics_prior.dynamics.constraint import (
+    STEP_TOLERANCE,
+    constrain_acceleration,
+    multiply,
+    project,
+    refresh,
+    respond,
+    width,
+)
 from physics_prior.dynamics.constraint_derivatives import differentiate_rows
 from physics_prior.dynamics.derivatives import apply_inverse_mass, inverse_dynamics_derivatives, sweep
 from physics_prior.dynamics.gyroscopic import take_at_middle
 from physics_prior.dynamics.kernel import kernel
-from physics_prior.dynamics.kinematics import move
+from physics_prior.dynamics.kinematics import flow, pose, weigh
 from physics_prior.dynamics.manifold import displace, displacement_derivative, rate, rate_derivative
+from physics_prior.dynamics.memory import sections, tangent_sections
 from physics_prior.effects.none import differentiate_forces, forces  # scene: effects
 
 CONSTRAINED = False  # scene: constraints
@@ -26,35 +32,42 @@ RUNGE_KUTTA = True  # scene: integrator
 
 
 @kernel
-def evaluate(links, work, pairs, rows, parameters, q, v, extra, step, vdot, spare):
+def evaluate(memory, q, v, extra, step, vdot):
     """Fill vdot (nv,) at q and v under the effects and extra generalized forces (nv,); return the constraints' rank.
 
-    step > 0 takes gyroscopic torques at the middle of such a step. spare (3, nv) is scratch.
+    step > 0 takes gyroscopic torques at the middle of such a step.
     """
+    links, work, pairs, rows, known, _, spare, parameters = sections(memory)
     gravity, tau = parameters[:3], spare[2]
-    move(links, work, q, v)
+    rank = 0
+    if CONSTRAINED:
+        rank = refresh(links, work, pairs, rows, known, q)
+    else:
+        pose(links, work, q)
+        weigh(links, work)
+        factorize(links, work)
+    flow(links, work, v)
     if step > 0.0:
         take_at_middle(links, work, step)
     copy(extra, tau)
     forces(parameters, links, work, q, v, tau)
-    factorize(links, work)
     accelerate(links, work, tau, gravity, vdot)
-    rank = 0
     if CONSTRAINED:
-        rank = constrain_acceleration(links, work, pairs, rows, gravity, vdot, spare)
+        constrain_acceleration(links, work, pairs, rows, gravity, vdot, spare)
     return rank
 
 
 @kernel
-def advance(links, work, pairs, rows, parameters, q, v, extra, h, count, start, scratch):
-    """Move q (nq,) and v (nv,) in place by count steps of h seconds; return the constraints' rank.
+def advance(memory, q, v, extra, h, count):
+    """Move q (nq,) and v (nv,) in place by count steps of h seconds; return the constraints' rank, -1 if not finite.
 
     Semi-implicit Euler, or the classical Runge-Kutta method of order four in the coordinates theta of q0 [+] theta (Munthe-Kaas
-    1999). Constraints are projected after each step. extra (nv,) is constant; start (nq,), scratch (9, nv).
+    1999). Constraints are projected after each step. extra (nv,) is constant.
     """
+    links, work, pairs, rows, known, start, spare, _ = sections(memory)
     nv = v.shape[0]
-    spare, vdot, theta, middle = scratch[0:3], scratch[3], scratch[4], scratch[5]
-    theta_rate, theta_sum, v_sum = scratch[6], scratch[7], scratch[8]
+    vdot, theta, middle = spare[3], spare[4], spare[5]
+    theta_rate, theta_sum, v_sum = spare[6], spare[7], spare[8]
     rank = 0
     for _ in range(count):
         if RUNGE_KUTTA:
@@ -64,7 +77,7 @@ def advance(links, work, pairs, rows, parameters, q, v, extra, h, count, start, 
             clear(theta_sum)
             clear(v_sum)
             for stage in range(4):
-                rank = evaluate(links, work, pairs, rows, parameters, q, middle, extra, 0.0, vdot, spare)
+                rank = evaluate(memory, q, middle, extra, 0.0, vdot)
                 rate(links, theta, middle, theta_rate)
                 weight = h / 6.0 if stage == 0 or stage == 3 else h / 3.0
                 ahead = h if stage == 2 else 0.5 * h
@@ -79,30 +92,34 @@ def advance(links, work, pairs, rows, parameters, q, v, extra, h, count, start, 
             for k in range(nv):
                 v[k] += v_sum[k]
         else:
-            rank = evaluate(links, work, pairs, rows, parameters, q, v, extra, h, vdot, spare)
+            rank = evaluate(memory, q, v, extra, h, vdot)
             for k in range(nv):
                 v[k] += h * vdot[k]
                 theta[k] = h * v[k]
             displace(links, q, theta, q)
         if CONSTRAINED:
-            project(links, work, pairs, rows, q, v, spare)
-    return rank
+            project(links, work, pairs, rows, known, q, v, spare, STEP_TOLERANCE)
+    total = 0.0
+    for k in range(nv):
+        total += abs(v[k])
+    for k in range(q.shape[0]):
+        total += abs(q[k])
+    return rank if math.isfinite(total) else -1
 
 
 @kernel
-def differentiate(
-    links, work, pairs, rows, parameters, q, v, step, derivative, matrices, freedoms, composites, gaps, spare
-):
-    """Fill derivative (2 nv, nv): row j is the derivative of vdot by the j-th tangent of q, row nv + j by v_j.
+def differentiate(memory, tangent, q, v, step):
+    """Fill the tangent's derivative (2 nv, nv): row j is that of vdot by the j-th tangent of q, row nv + j by v_j.
 
-    Needs ``evaluate`` at the same state. matrices (2, nv, nv) and (4, m, nv) in ``constraint_matrices`` are scratch.
+    Needs ``evaluate`` at the same state.
     """
-    nv = v.shape[0]
+    links, work, pairs, rows, _, _, spare, parameters = sections(memory)
+    m, nv = rows.shape[0], v.shape[0]
+    derivative, matrices, _, freedoms, composites, gaps = tangent_sections(tangent, links.shape[0], m, nv)
     gravity = parameters[:3]
     tau_q, tau_v = matrices[0:nv], matrices[nv : 2 * nv]
     sweep(links, work, gravity, step, freedoms, composites)
     inverse_dynamics_derivatives(links, freedoms, composites, tau_q, tau_v)
-    m = rows.shape[0]
     A, A_q = matrices[2 * nv : 2 * nv + m], matrices[2 * nv + m : 2 * nv + 2 * m]
     rows_q, rows_v = matrices[2 * nv + 2 * m : 2 * nv + 3 * m], matrices[2 * nv + 3 * m : 2 * nv + 4 * m]
     if CONSTRAINED:
@@ -118,14 +135,15 @@ def differentiate(
             derivative[nv + j, i] = tau_v[i, j]
     apply_inverse_mass(links, work, derivative, spare)
     if CONSTRAINED:
+        right = rows[:, 2 * width(rows) + 2 * m]
         for j in range(2 * nv):
             for r in range(m):
                 total = rows_q[r, j] if j < nv else rows_v[r, j - nv]
                 for k in range(nv):
                     total += A[r, k] * derivative[j, k]
-                rows[r, 2 * nv + 2 * m] = -total
-            multiply(rows, nv)
-            respond(links, work, rows, nv, spare[0], spare[1])
+                right[r] = -total
+            multiply(rows)
+            respond(links, work, rows, spare[0], spare[1])
             for k in range(nv):
                 derivative[j, k] += spare[1, k]
 
@@ -143,12 +161,14 @@ def _combine(derivative, q_x, v_x, out):
 
 
 @kernel
-def project_columns(links, work, pairs, rows, A, A_q, columns, spare):
+def project_columns(memory, A, A_q, columns):
     """Put the columns (2 nv, k) of errors of q and v onto the constraints' tangent space, in the mass metric.
 
-    A dq = 0 and A dv + d(A v)/dq dq = 0: the covariance then has no mass in forbidden directions.
+    A dq = 0 and A dv + d(A v)/dq dq = 0: the covariance then has no mass in forbidden directions. Needs ``refresh``.
     """
+    links, work, _, rows, _, _, spare, _ = sections(memory)
     nv, m = A.shape[1], A.shape[0]
+    right = rows[:, 2 * width(rows) + 2 * m]
     for c in range(columns.shape[1]):
         for part in range(2):
             for r in range(m):
@@ -157,68 +177,41 @@ def project_columns(links, work, pairs, rows, A, A_q, columns, spare):
                     total += A[r, k] * columns[part * nv + k, c]
                     if part == 1:
                         total += A_q[r, k] * columns[k, c]
-                rows[r, 2 * nv + 2 * m] = -total
-            multiply(rows, nv)
-            respond(links, work, rows, nv, spare[0], spare[1])
+                right[r] = -total
+            multiply(rows)
+            respond(links, work, rows, spare[0], spare[1])
             for k in range(nv):
                 columns[part * nv + k, c] += spare[1, k]
 
 
 @kernel
-def tangent_rows(links, work, pairs, rows, parameters, q, v, A, A_q, matrices, freedoms, composites, gaps):
-    """Fill A (m, nv) and A_q (m, nv) at a state that ``project`` has just left: its factors still stand."""
-    nv, m = v.shape[0], rows.shape[0]
-    move(links, work, q, v)
-    place(work, pairs)
+def tangent_rows(memory, tangent, q, v, A, A_q):
+    """Fill A (m, nv) and A_q (m, nv), the constraint Jacobian and the derivative of A v by q, at q and v."""
+    links, work, pairs, rows, known, _, _, parameters = sections(memory)
+    m, nv = rows.shape[0], v.shape[0]
+    _, matrices, _, freedoms, composites, gaps = tangent_sections(tangent, links.shape[0], m, nv)
+    refresh(links, work, pairs, rows, known, q)
+    flow(links, work, v)
     sweep(links, work, parameters[:3], 0.0, freedoms, composites)
+    rows_q, rows_v = matrices[2 * nv + 2 * m : 2 * nv + 3 * m], matrices[2 * nv + 3 * m : 2 * nv + 4 * m]
     differentiate_rows(
-        links,
-        work,
-        pairs,
-        freedoms,
-        composites,
-        parameters[:3],
-        gaps,
-        A,
-        A_q,
-        matrices[2 * nv + 2 * m : 2 * nv + 3 * m],
-        matrices[2 * nv + 3 * m : 2 * nv + 4 * m],
-        matrices[0:nv],
+        links, work, pairs, freedoms, composites, parameters[:3], gaps, A, A_q, rows_q, rows_v, matrices[0:nv]
     )
 
 
 @kernel
-def linearise(
-    links,
-    work,
-    pairs,
-    rows,
-    parameters,
-    q,
-    v,
-    extra,
-    h,
-    force_noise,
-    F,
-    G,
-    derivative,
-    matrices,
-    stages,
-    freedoms,
-    composites,
-    gaps,
-    start,
-    scratch,
-):
-    """Make one step as ``advance`` does and fill its derivatives.
+def linearise(memory, tangent, q, v, extra, h, force_noise, F, G):
+    """Make one step as ``advance`` does, fill its derivatives and return the rank.
 
     F (2 nv, 2 nv): the new error by the old. G (2 nv, 2 nv): a factor of what white generalized forces of density
     force_noise (nv,) [N sqrt(s), N m sqrt(s)] add over the step: G G^T = integral of B B^T with B = M^-1 force_noise, the
-    double integrator's exact second moments. stages (7, nv, 2 nv), matrices (2 nv + 4 m, nv) are scratch.
+    double integrator's exact second moments.
     """
-    nv = v.shape[0]
-    spare, vdot, theta, middle = scratch[0:3], scratch[3], scratch[4], scratch[5]
-    theta_rate, theta_sum, v_sum = scratch[6], scratch[7], scratch[8]
+    links, work, pairs, rows, known, start, spare, _ = sections(memory)
+    m, nv = rows.shape[0], v.shape[0]
+    derivative, matrices, stages, _, _, _ = tangent_sections(tangent, links.shape[0], m, nv)
+    vdot, theta, middle = spare[3], spare[4], spare[5]
+    theta_rate, theta_sum, v_sum = spare[6], spare[7], spare[8]
     start_x, theta_x, v_x, q_x = stages[0], stages[1], stages[2], stages[3]
     rate_x, theta_sum_x, v_sum_x = stages[4], stages[5], stages[6]
     clear(start_x)
@@ -234,30 +227,15 @@ def linearise(
     copy(v, middle)
     copy(start_x, q_x)
     step = 0.0 if RUNGE_KUTTA else h
-    m = rows.shape[0]
     A, A_q = matrices[2 * nv : 2 * nv + m], matrices[2 * nv + m : 2 * nv + 2 * m]
+    rank = 0
     for stage in range(4 if RUNGE_KUTTA else 1):
-        rank = evaluate(links, work, pairs, rows, parameters, q, middle, extra, step, vdot, spare)
-        differentiate(
-            links,
-            work,
-            pairs,
-            rows,
-            parameters,
-            q,
-            middle,
-            step,
-            derivative,
-            matrices,
-            freedoms,
-            composites,
-            gaps,
-            spare,
-        )
+        rank = evaluate(memory, q, middle, extra, step, vdot)
+        differentiate(memory, tangent, q, middle, step)
         if stage == 0:
             _force_noise(links, work, force_noise, h, G, spare)
             if CONSTRAINED:
-                project_columns(links, work, pairs, rows, A, A_q, G, spare)
+                project_columns(memory, A, A_q, G)
         if RUNGE_KUTTA:
             rate(links, theta, middle, theta_rate)
             rate_derivative(links, theta, middle, theta_x, v_x, rate_x)
@@ -296,10 +274,10 @@ def linearise(
     copy(q_x, F[:nv])
     copy(v_sum_x, F[nv:])
     if CONSTRAINED:
-        project(links, work, pairs, rows, q, v, spare)
-        tangent_rows(links, work, pairs, rows, parameters, q, v, A, A_q, matrices, freedoms, composites, gaps)
-        project_columns(links, work, pairs, rows, A, A_q, F, spare)
-        project_columns(links, work, pairs, rows, A, A_q, G, spare)
+        project(links, work, pairs, rows, known, q, v, spare, STEP_TOLERANCE)
+        tangent_rows(memory, tangent, q, v, A, A_q)
+        project_columns(memory, A, A_q, F)
+        project_columns(memory, A, A_q, G)
     return rank
 
 

@@ -1,0 +1,120 @@
+"""The memory of a compiled step: one array that holds the model, the workspace and the constraints.
+
+A call from Python costs about 0.06 us an array and 0.13 us an array of records: as much as the motion of a few links. So a
+step takes one array, and both sides see its sections as the records and matrices that they are.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+from numba import carray, types
+from numba.extending import intrinsic
+
+from physics_prior.dynamics.constraint_derivatives import GAP
+from physics_prior.dynamics.derivatives import COMPOSITE, FREEDOM
+from physics_prior.dynamics.kernel import inline_kernel
+from physics_prior.dynamics.records import LINK, PAIR, WORK
+
+HEAD = 8
+LINK_SIZE, WORK_SIZE, PAIR_SIZE = LINK.itemsize // 8, WORK.itemsize // 8, PAIR.itemsize // 8
+FREEDOM_SIZE, COMPOSITE_SIZE, GAP_SIZE = FREEDOM.itemsize // 8, COMPOSITE.itemsize // 8, GAP.itemsize // 8
+FLOAT = np.dtype(np.float64)
+SPARE = 9  # vectors (nv,) of scratch
+
+
+class Memory:
+    """The memory, as Python sees it.
+
+    Attributes:
+        array: what compiled steps take.
+        links, work, pairs: (N,) LINK, (N,) WORK and (P,) PAIR records.
+        rows: (m, 2 w + 2 m + 3) constraint rows over the w degrees of freedom that they move (constraint.py).
+        known: (nq + 1,) the configuration whose factors and rows stand in the memory, and the rows' rank there.
+        parameters: the numbers of the effects.
+    """
+
+    def __init__(
+        self, links: np.ndarray, pairs: np.ndarray, width: int, parameters: np.ndarray, nq: int, nv: int
+    ) -> None:
+        m = int(pairs["rows"].sum())
+        sizes = [
+            len(links) * LINK_SIZE,
+            len(links) * WORK_SIZE,
+            len(pairs) * PAIR_SIZE,
+            m * (2 * width + 2 * m + 3),
+            nq + 1,
+            nq,
+            SPARE * nv,
+            len(parameters),
+        ]
+        ends = HEAD + np.cumsum([0, *sizes])
+        self.array = np.zeros(ends[-1])
+        self.array[:6] = len(links), len(pairs), m, nq, nv, sizes[3]
+        own = [self.array[a:b] for a, b in pairwise(ends)]
+        self.links, self.work, self.pairs = own[0].view(LINK), own[1].view(WORK), own[2].view(PAIR)
+        self.rows = own[3].reshape(m, 2 * width + 2 * m + 3)
+        self.known, self.parameters = own[4], own[7]
+        self.spare = own[6].reshape(SPARE, nv)
+        self.links[:], self.pairs[:], self.parameters[:] = links, pairs, parameters
+
+
+@intrinsic
+def address(_typing_context, array, index):
+    """The address of an element of an array, for ``carray``."""
+
+    def build(context, builder, signature, arguments):
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        return builder.bitcast(builder.gep(data, [arguments[1]]), context.get_value_type(types.voidptr))
+
+    return types.voidptr(array, types.intp), build
+
+
+@inline_kernel
+def sections(memory):
+    """The sections of the memory, as kernels see them: links, work, pairs, rows, known, start, spare, parameters.
+
+    Bare arrays at addresses in the memory, which the caller holds: views would count references at 5 ns each.
+    """
+    n, p, m = int(memory[0]), int(memory[1]), int(memory[2])
+    nq, nv = int(memory[3]), int(memory[4])
+    a = HEAD + n * LINK_SIZE
+    b = a + n * WORK_SIZE
+    c = b + p * PAIR_SIZE
+    d = c + int(memory[5])
+    e = d + nq + 1
+    f = e + nq
+    g = f + SPARE * nv
+    return (
+        carray(address(memory, HEAD), n, LINK),
+        carray(address(memory, a), n, WORK),
+        carray(address(memory, b), p, PAIR),
+        carray(address(memory, c), (m, (d - c) // max(m, 1)), FLOAT),
+        carray(address(memory, d), nq + 1, FLOAT),
+        carray(address(memory, e), nq, FLOAT),
+        carray(address(memory, f), (SPARE, nv), FLOAT),
+        carray(address(memory, g), memory.shape[0] - g, FLOAT),
+    )
+
+
+def tangent_memory(n: int, m: int, nv: int) -> np.ndarray:
+    """What ``linearise`` needs beside the memory, for n links, m rows and nv degrees of freedom."""
+    matrices = (2 * nv + 2 * nv + 4 * m) * nv + 7 * nv * 2 * nv
+    return np.zeros(matrices + nv * FREEDOM_SIZE + n * COMPOSITE_SIZE + nv * GAP_SIZE)
+
+
+@inline_kernel
+def tangent_sections(tangent, n, m, nv):
+    """The sections: derivative (2 nv, nv), matrices (2 nv + 4 m, nv), stages (7, nv, 2 nv), freedoms, composites, gaps."""
+    a = 2 * nv * nv
+    b = a + (2 * nv + 4 * m) * nv
+    c = b + 14 * nv * nv
+    d = c + nv * FREEDOM_SIZE
+    e = d + n * COMPOSITE_SIZE
+    return (
+        carray(address(tangent, 0), (2 * nv, nv), FLOAT),
+        carray(address(tangent, a), (2 * nv + 4 * m, nv), FLOAT),
+        carray(address(tangent, b), (7, nv, 2 * nv), FLOAT),
+        carray(address(tangent, c), nv, FREEDOM),
+        carray(address(tangent, d), n, COMPOSITE),
+        carray(address(tangent, e), nv, GAP),
+    )

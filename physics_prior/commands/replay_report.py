@@ -7,6 +7,7 @@ import numpy as np
 from rich.table import Table
 
 from physics_prior.commands.terminal import console, table
+from physics_prior.estimation.score import FROM_SECONDS
 from physics_prior.recording.replay import ReplayResult
 
 MOST_HEALTH = 1e-3  # s, of a health that is worth a word
@@ -67,9 +68,14 @@ def _nis(nis: dict[str, Any]) -> str:
 
 
 def _readouts(result: ReplayResult) -> Table:
-    out = table("readouts", "name", "unit", "least", "most", "last", "standard deviation, median", numbers=4)
-    for name, values in result.readouts.items():
-        columns, spread = (each.reshape(len(each), -1) for each in (values, result.deviations[name]))
+    settled = result.stamps >= FROM_SECONDS
+    if not settled.any():
+        settled[:] = True
+    title = "readouts" if settled.all() else f"readouts, from {FROM_SECONDS:g} s on"
+    out = table(title, "name", "unit", "least", "most", "last", "standard deviation, median", numbers=4)
+    for name in result.readouts:
+        values, spread = (each[name][settled] for each in (result.readouts, result.deviations))
+        columns, spread = values.reshape(len(values), -1), spread.reshape(len(spread), -1)
         for index, column in enumerate(columns.T):
             label = f"{name}/{'xyz'[index]}" if columns.shape[1] == 3 else name
             shown = (column.min(), column.max(), column[-1], np.median(spread[:, index]))

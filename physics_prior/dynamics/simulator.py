@@ -35,6 +35,7 @@ class Simulator:
         tree, effects, integrator: what it was built from.
         nq, nv, rows: sizes of configuration, velocity and constraint rows.
         wrench_names: whose wrenches there are: moving joints, then effects that hold something.
+        step, memory: the compiled step (step.py as composed for the scene) and the array it works in (memory.py).
         rank: rank of the constraint rows at the last evaluation (below ``rows`` where some are redundant: then the motion is
             unique, the split of forces is not).
 
@@ -68,9 +69,10 @@ class Simulator:
             self.nq,
             self.nv,
         )
-        self._memory, self._links, self._work, self._pairs = memory, memory.links, memory.work, memory.pairs
+        self.memory = memory
+        self._links, self._work, self._pairs = memory.links, memory.work, memory.pairs
         self._gravity = memory.parameters[:GRAVITY]
-        self._step = step_module(effects, bool(pairs), integrator)
+        self.step = step_module(effects, bool(pairs), integrator)
         self._rotations, self._origins = self._work["rotation"].reshape(-1, 3, 3), self._work["origin"]
         self._frames: dict[str, tuple[int, np.ndarray, np.ndarray]] = {}
         self._still, self._vdot = np.zeros(self.nv), np.zeros(self.nv)
@@ -81,8 +83,17 @@ class Simulator:
         """(nv,) vdot at q and v under the effects and generalized forces tau (nv,); fills ``rank``."""
         vdot = np.zeros(self.nv)
         extra = self._still if tau is None else tau
-        self.rank = self._step.evaluate(self._memory.array, q, v, extra, 0.0, vdot)
+        self.rank = self.step.evaluate(self.memory.array, q, v, extra, 0.0, vdot)
         return vdot
+
+    def acceleration_derivatives(
+        self, q: np.ndarray, v: np.ndarray, tau: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives (nv, nv) of ``acceleration`` by the tangent of q and by v, at constant tau."""
+        extra, nv = self._still if tau is None else tau, self.nv
+        self.rank = self.step.differentiate_acceleration(self.memory.array, self.tangent_array(), q, v, extra)
+        by_state = self.tangent_array()[: 2 * nv * nv].reshape(2, nv, nv)
+        return by_state[0].T.copy(), by_state[1].T.copy()
 
     def advance(self, q: np.ndarray, v: np.ndarray, h: float, count: int = 1, tau: np.ndarray | None = None) -> None:
         """Move q and v in place by count steps of h seconds, under constant extra forces tau (nv,).
@@ -91,7 +102,7 @@ class Simulator:
             SimulationError: the motion left the numbers (a step far too large for it).
         """
         extra = self._still if tau is None else tau
-        self.rank = self._step.advance(self._memory.array, q, v, extra, h, count)
+        self.rank = self.step.advance(self.memory.array, q, v, extra, h, count)
         if self.rank < 0:
             raise SimulationError(
                 f"the motion is not finite after a step of {h:g} s: a smaller step size or the other integrator may do"
@@ -107,14 +118,14 @@ class Simulator:
         constraints.
         """
         F, G = np.empty((2 * self.nv, 2 * self.nv)), np.empty((2 * self.nv, 2 * self.nv))
-        self.rank = self._step.linearise(self._memory.array, self._tangents(), q, v, self._still, h, force_noise, F, G)
+        self.rank = self.step.linearise(self.memory.array, self.tangent_array(), q, v, self._still, h, force_noise, F, G)
         return F, G
 
     def project(self, q: np.ndarray, v: np.ndarray) -> float:
         """Put q and v onto the constraints in place, in the mass metric; return the position error left, m."""
         if self.rows == 0:
             return 0.0
-        own = self._memory
+        own = self.memory
         system = (own.links, own.work, own.pairs, own.rows, own.known, q)
         constraint.refresh(*system)
         return float(constraint.project(*system, v, own.spare, constraint.TOLERANCE))
@@ -129,13 +140,13 @@ class Simulator:
         """Put q and v, and the columns of a factor (2 nv, k) of their errors, onto the constraints, in place."""
         if self.rows:
             self.project(q, v)
-            self._step.project_columns(self._memory.array, *self.tangent_rows(q, v), factor)
+            self.step.project_columns(self.memory.array, *self.tangent_rows(q, v), factor)
 
     def tangent_rows(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Constraint Jacobian A (rows, nv) and the derivative of A v by the tangent of q (rows, nv)."""
         A, A_q = np.zeros((self.rows, self.nv)), np.zeros((self.rows, self.nv))
         if self.rows:
-            self._step.tangent_rows(self._memory.array, self._tangents(), q, v, A, A_q)
+            self.step.tangent_rows(self.memory.array, self.tangent_array(), q, v, A, A_q)
         return A, A_q
 
     def constraint_error(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -209,7 +220,7 @@ class Simulator:
         out = np.zeros((len(self.wrench_names), 6))
         count = len(self._links)
         if vdot is None:
-            self.rank = self._step.evaluate(self._memory.array, q, v, self._still, 0.0, self._vdot)
+            self.rank = self.step.evaluate(self.memory.array, q, v, self._still, 0.0, self._vdot)
             constraint.load_links(self._work, self._pairs)
             for row, (_, first, last) in enumerate(self._labels, start=count):
                 own = self._pairs[first:last]
@@ -237,10 +248,10 @@ class Simulator:
     @property
     def effort(self) -> np.ndarray:
         """(nv,) generalized forces of the effects at the last ``acceleration`` or ``wrenches``."""
-        return np.array(self._memory.spare[2])
+        return np.array(self.memory.spare[2])
 
-    def _tangents(self) -> np.ndarray:
-        """What derivatives need beside the memory, made when first needed."""
+    def tangent_array(self) -> np.ndarray:
+        """What derivatives need beside the memory (memory.py), made when first needed."""
         if not len(self._tangent):
             self._tangent = tangent_memory(len(self._links), self.rows, self.nv)
         return self._tangent

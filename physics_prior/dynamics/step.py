@@ -149,6 +149,14 @@ def differentiate(memory, tangent, q, v, step):
 
 
 @kernel
+def differentiate_acceleration(memory, tangent, q, v, extra):
+    """Fill the tangent's derivative of ``evaluate`` at q, v and extra, gyroscopic torques explicit; return the rank."""
+    rank = evaluate(memory, q, v, extra, 0.0, sections(memory)[6][3])
+    differentiate(memory, tangent, q, v, 0.0)
+    return rank
+
+
+@kernel
 def _combine(derivative, q_x, v_x, out):
     """Fill out (nv, k): the derivative of vdot from those of q and v, (nv, k) each."""
     nv = v_x.shape[0]

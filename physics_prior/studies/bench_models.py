@@ -1,11 +1,13 @@
 """The benchmark's human-like tree, and the same tree as Pinocchio and MuJoCo models, made from ours."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from physics_prior import inertia, rotations
+from physics_prior.dynamics.formulations.generalized import mass_matrix
 from physics_prior.effects import Anchor
 from physics_prior.inertia import MassProperties
 from physics_prior.model import Joint, JointKind, Link, Part, Tree
@@ -47,6 +49,15 @@ def humanlike() -> Tree:
 def _limb(mass: float, radius: float, length: float) -> MassProperties:
     """A capsule from the joint along z, downwards where the length is negative."""
     return inertia.capsule(mass, radius, abs(length)).transformed(np.eye(3), np.array([0.0, 0.0, 0.5 * length]))
+
+
+@dataclass(frozen=True)
+class PinocchioPosture:
+    """A state and forces in Pinocchio's convention: q (nq,), v (nv,), tau (nv,)."""
+
+    q: np.ndarray
+    v: np.ndarray
+    tau: np.ndarray
 
 
 class PinocchioModel:
@@ -104,6 +115,40 @@ class PinocchioModel:
                 n = link.v.start
                 out[n : n + 3, n : n + 3] = -rotations.skew(v[n + 3 : n + 6])
         return out
+
+    def posture(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> "PinocchioPosture":
+        """A state and forces of ours in Pinocchio's convention."""
+        turn = self.velocity_map(q)
+        return PinocchioPosture(self.configuration(q), turn @ v, turn @ tau)
+
+    def acceleration(self, q: np.ndarray, v: np.ndarray, vdot: np.ndarray) -> np.ndarray:
+        """(nv,) vdot of ours in Pinocchio's convention: d/dt (X v) = X vdot + W X v."""
+        turn = self.velocity_map(q)
+        return turn @ vdot + self.transport(v) @ turn @ v
+
+    def acceleration_derivatives(
+        self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, vdot: np.ndarray, by_q: np.ndarray, by_v: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Our derivatives (nv, nv) of vdot in Pinocchio's convention, where X v and X tau are held, not v and tau.
+
+        a = X vdot(q, v, tau) + W(w) X v. Turning the free joint by d in its own axes changes X u by -d x (X u), so with X v
+        and X tau constant v and tau of the free joint turn along: dv = X^T (d x X v).
+        """
+        turn, transport = self.velocity_map(q), self.transport(v)
+        inverse_mass = np.linalg.inv(mass_matrix(self.tree, q))
+        velocity_slope, force_slope, acceleration_slope = np.zeros((3, self.tree.nv, self.tree.nv))
+        slope_v = turn @ by_v + transport @ turn
+        for link in self.tree.links:
+            if link.joint.kind is JointKind.FREE:
+                n = link.v.start
+                linear, angular = slice(n, n + 3), slice(n + 3, n + 6)
+                for out, vector in ((velocity_slope, v), (force_slope, tau), (acceleration_slope, vdot)):
+                    out[linear, angular] = -rotations.skew((turn @ vector)[linear])
+                slope_v[linear, angular] += rotations.skew((turn @ v)[linear])
+        # columns of d; X^T velocity_slope d is what v must change by to keep X v
+        moved_v, moved_tau = turn.T @ velocity_slope, turn.T @ force_slope
+        slope_q = turn @ (by_q + by_v @ moved_v + inverse_mass @ moved_tau) - acceleration_slope
+        return slope_q @ turn.T, slope_v @ turn.T
 
     def hold(self, anchors: Sequence[Anchor], points: Sequence[np.ndarray]) -> tuple[Any, Any]:
         """Point contacts that hold anchors (on parts) at world points (3,) m: Pinocchio's models and their data."""

@@ -5,13 +5,13 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from physics_prior import inertia, rotations
+from physics_prior import rotations
 from physics_prior.dynamics.formulations import generalized
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects.attachment import Attachment, Hinge, Rod, Weld
 from physics_prior.effects.effect import Effect
 from physics_prior.effects.gravity import Gravity
-from physics_prior.model import Joint, JointKind, Part, Tree
+from physics_prior.model import JointKind
 
 FIELD = np.array([0.3, -0.2, -9.81])
 GRAVITY = Gravity(acceleration=tuple(FIELD))

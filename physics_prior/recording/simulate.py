@@ -3,12 +3,11 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
 
-from physics_prior import rotations
+from physics_prior import __version__, rotations
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.errors import SimulationError
 from physics_prior.estimation.measurement import (
@@ -91,7 +90,7 @@ def simulate(
     """Record a simulated motion as a bag: each source on its own topic, the truth beside it on /truth/... topics.
 
     The same scene, seed and duration give the same bytes on the same machine with the same versions of the libraries. Other
-    processors may round the motion differently in its last bits. progress is told the share that is done.
+    processors and versions may round differently in the last bits, no more. progress is told the share that is done.
 
     Raises:
         RecordingError: the bag exists or cannot be written; SimulationError: as ``motion``. Nothing is left half-written.
@@ -113,7 +112,7 @@ def simulate(
                 "seed": str(seed),
                 "duration_s": repr(float(duration)),
                 "rate_hz": repr(float(scene.simulation.rate)),
-                "version": _version(),
+                "version": __version__,
             },
         )
         for moment in motion(scene, simulator, seed, duration):
@@ -179,11 +178,3 @@ def _measure(
     return JointsMeasurement(
         stamp, source.topic, tuple(source.joints), true + source.noise * noise.normal(size=len(true))
     )
-
-
-def _version() -> str:
-    """The version of this program, or that it is not installed."""
-    try:
-        return version("physics_prior")
-    except PackageNotFoundError:
-        return "not installed"

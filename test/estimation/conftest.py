@@ -47,6 +47,7 @@ measurements:
       markers: [{name: a, part: base}, {name: b, part: forearm, point: [0, 0, 0.1]}, {name: c, part: slider, point: [0.1, 0, 0]}]
   - joints: {topic: /encoders, joints: {e1: elbow, e2: slide}, noise: 1e-3}
 noise: {force: 1e-2}
+step: {size: 4 ms}
 """
 
 

@@ -12,6 +12,7 @@ import yaml
 from physics_prior import __version__, cli
 from physics_prior.recording import open_bag
 from physics_prior.resources import shipped_scenes
+from physics_prior.studies import bench
 
 SUMMARY = {
     "measurements": {"read", "used", "gated", "late", "rejected"},
@@ -72,7 +73,7 @@ def test_help_and_version_import_nothing_heavy():
         "try:\n    main(sys.argv[1:])\nexcept SystemExit as leave:\n    assert leave.code == 0\n"
         "slow = {'numba', 'numpy', 'scipy', 'matplotlib'} & set(sys.modules)\nassert not slow, slow\n"
     )
-    for words in (["--help"], ["--version"], ["check", "-h"], ["simulate", "-h"], ["replay", "-h"]):
+    for words in (["--help"], ["--version"], *([name, "-h"] for name in cli.COMMANDS)):
         subprocess.run([sys.executable, "-c", script, *words], check=True, capture_output=True)
 
 
@@ -95,7 +96,7 @@ def test_version(capsys):
     ("words", "culprit", "valid"),
     [
         ([], "a command", "check, simulate"),
-        (["chekc"], "'chekc'", "'check'"),
+        (["chekc"], "'chekc'", "check"),
         (["check"], "SCENE", "check --help"),
         (["check", "nonesuch"], "'nonesuch'", "double_pendulum"),
         (["check", "wrong.yaml"], "wrong.yaml:1: unknown key 'descripton'", "description"),
@@ -114,12 +115,13 @@ def test_version(capsys):
         (["replay", "BAG", "--scene", "double_pendulum"], "/upper/pose", "/rod/pose"),
         (["replay", "BAG", "--scene", "pendulum", "--reference", "/nonesuch"], "/nonesuch", "/truth/joint_states"),
         (["replay", "BAG", "--scene", "pendulum", "--reference", "/rod/pose"], "PoseStamped", "JointState"),
-        (["replay", "BAG", "--scene", "pendulum", "--process", "magic"], "'magic'", "'kinematic'"),
+        (["replay", "BAG", "--scene", "pendulum", "--process", "magic"], "'magic'", "kinematic"),
         (["replay", "BAG", "--scene", "pendulum", "-o", "BAG"], "exists", "another name"),
         (["replay", "BAG", "--scene", "pendulum", "--plot", "new.gif"], "new.gif", ".png, .svg, .pdf"),
         (["replay", "BAG", "--scene", "pendulum", "--plot", "none/new.png"], "--plot none/new.png", "does not exist"),
         (["replay", "BAG", "--scene", "pendulum", "--json", "none/new"], "--json none/new", "does not exist"),
         (["replay", "BAG", "--scene", "pendulum", "--json", "."], "--json .", "give a file"),
+        (["bench", "--json", "none/new"], "--json none/new", "does not exist"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
@@ -275,6 +277,17 @@ def test_json_to_stdout_is_alone_there_and_as_documented(capsys, tmp_path, bag):
     for figure in ("wall_s", "realtime_factor"):
         del figures[figure], again[figure]
     assert again == figures
+
+
+def test_bench_prints_or_files_what_the_study_measured(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(bench, "ROUNDS", 2)
+    code, out, err = run(capsys, "bench", "--json", tmp_path / "bench.json")
+    assert (code, err) == (0, "")
+    assert "forward dynamics" in out
+    figures = json.loads((tmp_path / "bench.json").read_text())
+    assert set(figures) == {"ratios", "us", "machine"}
+    code, out, _ = run(capsys, "bench", "--json", "-")
+    assert set(json.loads(out)) == set(figures)
 
 
 def test_figures_that_there_are_not_are_null(capsys, bag):

@@ -8,7 +8,7 @@ from physics_prior.dynamics.compose import step_module
 from physics_prior.dynamics.kernel import cache_directory
 from physics_prior.scene import Scene
 
-DURATION = "~15 s"
+DURATION = "~20 s"
 
 
 @contextmanager

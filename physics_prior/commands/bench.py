@@ -1,0 +1,33 @@
+"""Time the kernels on a human-like tree of 16 bodies and 35 degrees of freedom, alone or against other engines.
+
+With --peers, Pinocchio and MuJoCo (their PyPI wheels, extra 'bench') take turns with ours in one run on one core; a ratio
+above 1 means that we are faster. Before anything is timed, the engines' results are compared.
+
+Examples:
+  physics-prior bench
+  physics-prior bench --peers --json bench.json
+"""
+
+import argparse
+
+from physics_prior.commands.terminal import STDOUT, console, progress, require_folder, write_json
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the arguments of `bench`."""
+    parser.add_argument("--peers", action="store_true", help="time Pinocchio and MuJoCo too")
+    parser.add_argument("--json", metavar="FILE", help="write the figures as JSON; - prints that and nothing else")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Time the kernels; 0."""
+    require_folder("--json", args.json)
+    from physics_prior.studies.bench import run_bench, table
+
+    with progress("timing") as report:
+        figures = run_bench(args.peers, lambda done, total: report(done / total))
+    if args.json is not None:
+        write_json(args.json, figures)
+    if args.json != STDOUT:
+        console().print(table(figures))
+    return 0

@@ -17,6 +17,7 @@ from physics_prior.estimation.measurement import (
     PoseMeasurement,
 )
 from physics_prior.estimation.observation import check, innovation
+from physics_prior.recording.simulate import motion
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -115,8 +116,6 @@ def test_a_quaternion_and_its_negative_are_one_measurement(every_source, filter_
 
 def test_noise_of_the_simulated_measurements_is_the_sources(every_source, filter_of):
     """Whitened by the source's covariance, innovations against the truth are white: axes and scales agree."""
-    from physics_prior.recording.simulate import motion
-
     scene = replace(every_source, initial=replace(every_source.initial, q=_state(every_source, 4)))
     scene = replace(scene, simulation=scene.simulation.model_copy(update={"rate": 1000.0}))
     filter = filter_of(scene)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
@@ -33,7 +33,7 @@ def test_triangularise_keeps_the_square(seed, n, more):
     triangularise(L)
     assert np.array_equal(np.triu(L, 1), np.zeros_like(L))
     assert np.all(np.diag(L) >= 0.0)
-    assert _relative(L @ L.T - W @ W.T, W @ W.T) < 1e-13  # 3e-15
+    assert _relative(L @ L.T - W @ W.T, W @ W.T) < 1e-13  # 1e-15
 
 
 def test_triangularise_leaves_zero_rows_alone():
@@ -48,7 +48,7 @@ def test_prediction_is_the_dense_one(seed, n, g):
     F, G, S = rng.normal(size=(n, n)), rng.normal(size=(n, g)), _factor(rng, n, 0)
     expected = F @ S @ S.T @ F.T + G @ G.T
     predict_factor(F, S, G, np.empty((n, n + g)))
-    assert _relative(S @ S.T - expected, expected) < 1e-13  # 2e-15
+    assert _relative(S @ S.T - expected, expected) < 1e-13  # 1e-15
 
 
 @given(seeds, st.integers(1, 8), st.integers(1, 6), st.integers(0, 3))
@@ -70,6 +70,7 @@ def test_update_is_the_dense_one(seed, n, m, unseen):
     assert _relative(W[m:, m:] @ W[m:, m:].T - joseph, P) < 1e-13 * conditioning
 
 
+@settings(max_examples=20)
 @given(seeds)
 def test_thousands_of_updates_at_extreme_variances(seed):
     """No update, however sharp or dull, leaves the covariance anything but one."""
@@ -107,7 +108,7 @@ def test_many_measurements_add_up_their_information():
         innovate(S, H, noise, W, whitened, np.zeros(m))
         S = np.ascontiguousarray(W[m:, m:])
     expected = np.linalg.inv(information)
-    assert _relative(S @ S.T - expected, expected) < 1e-11  # 2e-13
+    assert _relative(S @ S.T - expected, expected) < 1e-12  # 2e-14
 
 
 @pytest.mark.parametrize("rank", [1, 3, 6])

@@ -34,22 +34,22 @@ def test_forward_dynamics_equals_the_formulation(case):
     rng, tree, q, v = case
     tau = rng.normal(size=tree.nv)
     expected = generalized.accelerations(tree, q, v, tau, FIELD)
-    assert off(Simulator(tree, [GRAVITY]).acceleration(q, v, tau), expected) < 1e-10  # measured 6e-12
+    assert off(Simulator(tree, [GRAVITY]).acceleration(q, v, tau), expected) < 1e-10  # measured 6e-15
 
 
 def test_inverse_dynamics_and_mass_matrix_equal_the_formulation(case):
     rng, tree, q, v = case
     simulator, vdot = Simulator(tree, [GRAVITY]), rng.normal(size=tree.nv)
     expected = generalized.inverse_dynamics(tree, q, v, vdot, FIELD)
-    assert off(simulator.inverse_dynamics(q, v, vdot), expected) < 1e-12  # measured 1e-15
-    assert off(simulator.mass_matrix(q), generalized.mass_matrix(tree, q)) < 1e-12  # measured 1e-15
+    assert off(simulator.inverse_dynamics(q, v, vdot), expected) < 1e-12  # measured 2e-15
+    assert off(simulator.mass_matrix(q), generalized.mass_matrix(tree, q)) < 1e-12  # measured 2e-15
 
 
 def test_forward_and_inverse_dynamics_are_inverse(case):
     rng, tree, q, v = case
     simulator, tau = Simulator(tree, [GRAVITY]), rng.normal(size=tree.nv)
     vdot = simulator.acceleration(q, v, tau)
-    assert off(simulator.inverse_dynamics(q, v, vdot), tau) < 1e-10  # measured 4e-12
+    assert off(simulator.inverse_dynamics(q, v, vdot), tau) < 1e-10  # measured 5e-14
 
 
 def test_poses_velocities_and_jacobians_equal_the_formulation(case):
@@ -81,7 +81,7 @@ def test_joint_wrenches_equal_the_formulation(case):
         wrenches = simulator.wrenches(q, v, given)
         for link, force, moment in zip(tree.links, forces, moments, strict=True):
             wrench = wrenches[link.joint.name]
-            assert off(wrench.force, force) < 1e-11  # measured 3e-13
+            assert off(wrench.force, force) < 1e-11  # measured 1e-13
             assert off(wrench.moment, moment) < 1e-11
 
 
@@ -97,7 +97,7 @@ def test_energy_equals_the_formulation_and_changes_by_the_work_of_forces(case):
         return simulator.energy()
 
     power = (energy(h) - energy(-h)) / (2.0 * h)
-    assert off(power, v @ tau) < 1e-6  # of central differences; measured 2e-8
+    assert off(power, v @ tau) < 1e-6  # of central differences; measured 3e-8
 
 
 def test_momentum_of_a_free_tree_is_kept(random_tree, random_state):
@@ -124,7 +124,7 @@ def test_momentum_of_a_free_tree_is_kept(random_tree, random_state):
 
     before = momenta()
     simulator.advance(q, v, 1e-4, 1000)
-    assert off(momenta(), before) < 1e-9  # RK4 at 0.1 ms; measured 2e-13
+    assert off(momenta(), before) < 1e-9  # RK4 at 0.1 ms; measured 3e-15
 
 
 def test_state_that_is_not_finite_is_seen(double_pendulum):

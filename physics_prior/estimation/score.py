@@ -11,7 +11,7 @@ import numpy as np
 
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.errors import RecordingError
-from physics_prior.estimation.readout import COORDINATES, difference, evaluate, jacobian, rates, unit
+from physics_prior.estimation.readout import COORDINATES, Values, difference, evaluate, jacobian, rates, unit
 from physics_prior.scene import ForceReadout, JointReadout, Readout, Scene
 
 FROM_SECONDS = 0.2  # after the first measurement: the start's own error is not the filter's
@@ -65,19 +65,25 @@ class Score:
         acceleration: np.ndarray | None,
         positions: dict[str, float],
         velocities: dict[str, float],
-    ) -> None:
-        """Compare a state with the reference's positions and velocities by name."""
+    ) -> Values | None:
+        """Compare a state with the reference's positions and velocities by name.
+
+        Returns the scene's readouts at the reference state; None where the reference does not fix it.
+        """
         names = [readout.name for readout in self.compared]
         target = np.array([positions[name] for name in names])
         target_rates = np.array([velocities[name] for name in names])
         own, own_rates = self._coordinates(q, v), rates(self.compared, self.simulator, q, v)
         self._position.append(self._difference(own, target))
         self._velocity.append(np.array([own_rates[name] for name in names]) - target_rates)
-        true = self._state(q, target, target_rates) if self.forces else None
-        if true is not None:
+        true = self._state(q, target, target_rates)
+        if true is None:
+            return None
+        theirs = evaluate(self.scene.readouts, self.simulator, *true)
+        if self.forces:
             ours = evaluate(self.forces, self.simulator, q, v, acceleration)
-            theirs = evaluate(self.forces, self.simulator, *true)
             self._force.append(np.concatenate([np.atleast_1d(ours[name] - theirs[name]) for name in ours]))
+        return theirs
 
     def summary(self) -> dict[str, float | None]:
         """Root mean square errors: of angles [deg], lengths [m], rates and forces [% of the model's weight].

@@ -47,7 +47,7 @@ class ReplayResult:
         stamps: (k,) seconds.
         readouts, deviations: readout name -> (k,) or (k, 3); values and standard deviations; units by name.
         health: (k,) Level.
-        reference_stamps, reference: (r,) seconds, and name -> (r,), where there is one.
+        reference_stamps, reference: (r,) seconds, and readout name -> (r,) or (r, 3) at the reference state, where one fixes it.
         nis_stamps, nis, nis_dimension: (n,) seconds and innovations of each measurement that was used or gated.
         gated, topics: (n,) whether the gate refused it, and where it came from.
         counts: what became of the measurements; loss: what a damaged bag lost, or None.
@@ -144,6 +144,7 @@ class _Replay:
         self.result = ReplayResult(scene, smoothed, loss=self.reader.loss)
         self.settled: list[Node] = []
         self.rows: list[tuple[int, int, dict[str, np.ndarray], dict[str, np.ndarray]]] = []
+        self.true: list[tuple[int, dict[str, np.ndarray]]] = []
         self.innovations: list[tuple[int, float, int, bool, str]] = []
         self.first_stamp: int | None = None
         self.next_markers = self.next_diagnostics = 0
@@ -233,7 +234,9 @@ class _Replay:
             names = self.reference.names
             positions = dict(zip(names, at[0].tolist(), strict=True))
             velocities = dict(zip(names, at[1].tolist(), strict=True))
-            self.score.add(posterior.state.q, posterior.state.v, vdot, positions, velocities)
+            true = self.score.add(posterior.state.q, posterior.state.v, vdot, positions, velocities)
+            if true is not None:
+                self.true.append((posterior.stamp, true))
 
     def _file(self, posterior: Posterior, log_time: int, health: Health) -> None:
         """Write what the node would publish: states each time, pictures and diagnostics at their own pace."""
@@ -284,11 +287,18 @@ class _Replay:
             result.gated, result.topics = np.array(gated), list(topics)
         if self.reference is not None and self.score is not None:
             result.score = self.score.summary()
-            result.reference_stamps = (self.reference.stamps - self.first_stamp) / NANOSECONDS
-            result.reference = {
-                readout.name: self.reference.positions[:, self.reference.names.index(readout.name)]
-                for readout in self.score.compared
-            }
+            if self.true:
+                result.reference_stamps = (np.array([stamp for stamp, _ in self.true]) - self.first_stamp) / NANOSECONDS
+                result.reference = {
+                    readout.name: np.array([values[readout.name] for _, values in self.true])
+                    for readout in self.scene.readouts
+                }
+            else:  # positions alone, or not of all joints
+                result.reference_stamps = (self.reference.stamps - self.first_stamp) / NANOSECONDS
+                result.reference = {
+                    readout.name: self.reference.positions[:, self.reference.names.index(readout.name)]
+                    for readout in self.score.compared
+                }
 
 
 def _sources(reader: BagReader, scene: Scene) -> dict[str, Any]:

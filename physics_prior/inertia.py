@@ -12,9 +12,7 @@ from physics_prior.errors import ModelError
 
 Array = NDArray[np.float64]
 
-INERTIA_TOLERANCE = (
-    1e-6  # of the largest entry: what rounded digits in a model file may do to a valid inertia
-)
+INERTIA_TOLERANCE = 1e-6  # of the largest entry: what rounded digits in a model file may do to a valid inertia
 LARGEST_NUMBER = 1e60  # beyond any body in SI units, and far from where products of three overflow
 GAUSS_POINTS = 3  # per cell and axis: integrates polynomials up to degree 5
 MAXIMUM_CELLS = 128  # per axis: at most 57 million evaluations, in slabs of at most 147 456 points
@@ -46,14 +44,10 @@ class MassProperties:
         if mass < 0.0:
             raise ModelError(f"mass {mass:g} kg is negative: a body has a mass of zero or more")
         if mass == 0.0 and np.any(inertia):
-            raise ModelError(
-                f"mass is zero but inertia is {inertia.tolist()} kg m^2: a massless body has none"
-            )
+            raise ModelError(f"mass is zero but inertia is {inertia.tolist()} kg m^2: a massless body has none")
         asymmetry = np.max(np.abs(inertia - inertia.T))
         if asymmetry > INERTIA_TOLERANCE * np.max(np.abs(inertia)):
-            raise ModelError(
-                f"inertia {inertia.tolist()} kg m^2 is not symmetric: it is off by {asymmetry:g}"
-            )
+            raise ModelError(f"inertia {inertia.tolist()} kg m^2 is not symmetric: it is off by {asymmetry:g}")
         inertia = 0.5 * inertia + 0.5 * inertia.T
         _require_moments_of_a_body(np.linalg.eigvalsh(inertia))
         for name, array in (("center_of_mass", center_of_mass), ("inertia", inertia)):
@@ -82,9 +76,7 @@ class MassProperties:
         """
         vectors = np.linalg.eigh(self.inertia)[1]
         choices = [
-            vectors[:, order] * signs
-            for order in permutations(range(3))
-            for signs in product((1.0, -1.0), repeat=3)
+            vectors[:, order] * signs for order in permutations(range(3)) for signs in product((1.0, -1.0), repeat=3)
         ]
         # rounded, so that ties are settled by the order of the choices and not by the last bit
         axes = max((R for R in choices if np.linalg.det(R) > 0.0), key=lambda R: round(float(np.trace(R)), 9))
@@ -94,9 +86,7 @@ class MassProperties:
     def scaled(self, mass: float) -> "MassProperties":
         """Return the same distribution of another mass, kg; ModelError if the body is massless now."""
         if self.mass == 0.0:
-            raise ModelError(
-                f"a massless body cannot be scaled to {mass:g} kg: it has no distribution of mass"
-            )
+            raise ModelError(f"a massless body cannot be scaled to {mass:g} kg: it has no distribution of mass")
         return MassProperties(mass, self.center_of_mass, self.inertia * (mass / self.mass))
 
 

@@ -50,6 +50,4 @@ def scene_path(name_or_path: str | Path) -> Path:
     names = shipped_scenes()
     if str(name_or_path) in names:
         return share_directory() / _SCENES / f"{name_or_path}.yaml"
-    raise SceneError(
-        f"scene '{name_or_path}' is neither a file nor a shipped scene; shipped are {', '.join(names)}"
-    )
+    raise SceneError(f"scene '{name_or_path}' is neither a file nor a shipped scene; shipped are {', '.join(names)}")

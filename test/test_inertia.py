@@ -77,9 +77,7 @@ def test_rod_is_the_thin_limit_of_cylinder_and_box():
 
 def test_limits_of_a_capsule_are_a_sphere_and_a_rod():
     np.testing.assert_allclose(inertia.capsule(2.0, 0.3, 1e-15).inertia, inertia.sphere(2.0, 0.3).inertia)
-    np.testing.assert_allclose(
-        inertia.capsule(2.0, 1e-15, 0.3).inertia, inertia.rod(2.0, 0.3).inertia, atol=1e-16
-    )
+    np.testing.assert_allclose(inertia.capsule(2.0, 1e-15, 0.3).inertia, inertia.rod(2.0, 0.3).inertia, atol=1e-16)
 
 
 @given(st.lists(positions, min_size=1, max_size=6), positions)
@@ -87,8 +85,7 @@ def test_parallel_axes_and_composites_are_sums_over_points(points, about):
     """Sum of m (r.r I - r r^T) over all points, about any point."""
     body = inertia.combine([inertia.point_mass(i + 1.0, point) for i, point in enumerate(points)])
     expected = sum(
-        (i + 1.0) * -rotations.skew(point - about) @ rotations.skew(point - about)
-        for i, point in enumerate(points)
+        (i + 1.0) * -rotations.skew(point - about) @ rotations.skew(point - about) for i, point in enumerate(points)
     )
     np.testing.assert_allclose(body.about(about), expected, atol=1e-11)  # 1e-13
 
@@ -113,9 +110,7 @@ def test_transformed_keeps_principal_moments_and_moves_the_centre(body, rotation
     moved = body.transformed(R, translation)
     np.testing.assert_allclose(moved.center_of_mass, R @ body.center_of_mass + translation, atol=1e-14)
     # about a point that moves along, the inertia only turns
-    np.testing.assert_allclose(
-        moved.about(translation), R @ body.about(np.zeros(3)) @ R.T, atol=1e-12
-    )  # 4e-14
+    np.testing.assert_allclose(moved.about(translation), R @ body.about(np.zeros(3)) @ R.T, atol=1e-12)  # 4e-14
     back = moved.transformed(R.T, -R.T @ translation)
     np.testing.assert_allclose(back.inertia, body.inertia, atol=1e-11)  # 2e-13
     np.testing.assert_allclose(back.center_of_mass, body.center_of_mass, atol=1e-13)  # 2e-15
@@ -134,9 +129,7 @@ def test_principal_axes_diagonalise_the_inertia(body):
     np.testing.assert_array_equal(again[1], q)
 
 
-@pytest.mark.parametrize(
-    "moments", [(1.0, 2.0, 2.5), (2.5, 1.0, 2.0), (2.0, 2.0, 1.0), (1.0, 1.0, 1.0), (0, 0, 0)]
-)
+@pytest.mark.parametrize("moments", [(1.0, 2.0, 2.5), (2.5, 1.0, 2.0), (2.0, 2.0, 1.0), (1.0, 1.0, 1.0), (0, 0, 0)])
 def test_diagonal_inertia_keeps_its_axes(moments):
     found, q = MassProperties(1.0, np.zeros(3), np.diag(moments)).principal_axes()
     np.testing.assert_allclose(found, moments, atol=1e-15)

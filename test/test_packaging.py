@@ -30,9 +30,7 @@ def tracked() -> set[PurePosixPath]:
     """Files under version control, relative to the repository."""
     if not (ROOT / ".git").exists():
         pytest.skip("missing .git: this copy is not under version control")
-    listing = subprocess.run(
-        ["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True, text=True
-    ).stdout
+    listing = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
     return {PurePosixPath(name) for name in listing.split("\0") if name}
 
 
@@ -58,9 +56,7 @@ def test_every_scene_launch_file_and_bag_is_installed_at_its_own_path(
     }
 
 
-def test_every_module_is_in_an_installed_package(
-    distribution: Distribution, tracked: set[PurePosixPath]
-) -> None:
+def test_every_module_is_in_an_installed_package(distribution: Distribution, tracked: set[PurePosixPath]) -> None:
     modules = {file for file in tracked if file.parts[0] == "physics_prior" and file.suffix == ".py"}
     assert modules
     assert {".".join(file.parts[:-1]) for file in modules} <= set(distribution.packages)

@@ -35,9 +35,7 @@ def install(monkeypatch: pytest.MonkeyPatch, prefix: Path, layout: str) -> Path:
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_finds_its_files_in_every_layout(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, layout: str
-) -> None:
+def test_finds_its_files_in_every_layout(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, layout: str) -> None:
     share = install(monkeypatch, tmp_path, layout)
     assert resources.share_directory() == share
     assert resources.shipped_scenes() == ["four_bar", "pendulum"]
@@ -52,9 +50,7 @@ def test_an_environment_inside_the_checkout_reads_its_own_files(
     assert resources.share_directory() == share
 
 
-def test_a_linked_package_reads_the_files_it_links_to(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_linked_package_reads_the_files_it_links_to(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """As ``colcon build --symlink-install`` does it: the build folder links to the checkout."""
     share = install(monkeypatch, tmp_path / "source", "checkout")
     (tmp_path / "source" / "physics_prior" / "resources.py").touch()

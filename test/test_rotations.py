@@ -182,9 +182,7 @@ def right_jacobian_by_differences(v: np.ndarray, step: float) -> np.ndarray:
 
 @given(vectors)
 def test_right_jacobian_is_the_derivative_of_exp(v):
-    np.testing.assert_allclose(
-        rotations.right_jacobian(v), right_jacobian_by_differences(v, 1e-5), atol=1e-9
-    )  # 2e-10
+    np.testing.assert_allclose(rotations.right_jacobian(v), right_jacobian_by_differences(v, 1e-5), atol=1e-9)  # 2e-10
 
 
 @pytest.mark.parametrize("length", [0.0, 1e-300, 1e-8, 0.99e-4, 1.01e-4, 1e-3, 1.0, 3.0, np.pi, 5.0])

@@ -4,25 +4,26 @@ Tuples become scalars in registers: nothing is allocated, and the kernels above 
 """
 
 from physics_prior.dynamics.kernel import inline_kernel
+from physics_prior.dynamics.types import Array, Matrix, Symmetric, Vector
 
 ZERO = (0.0, 0.0, 0.0)
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 @inline_kernel
-def get3(a):
+def get3(a: Array) -> Vector:
     """The vector stored in array a."""
     return a[0], a[1], a[2]
 
 
 @inline_kernel
-def put3(a, u):
+def put3(a: Array, u: Vector) -> None:
     """Store vector u in array a."""
     a[0], a[1], a[2] = u[0], u[1], u[2]
 
 
 @inline_kernel
-def add3(a, u):
+def add3(a: Array, u: Vector) -> None:
     """Add vector u to array a."""
     a[0] += u[0]
     a[1] += u[1]
@@ -30,61 +31,61 @@ def add3(a, u):
 
 
 @inline_kernel
-def get9(a):
+def get9(a: Array) -> Matrix:
     """The matrix stored in array a (9,)."""
     return a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8]
 
 
 @inline_kernel
-def put9(a, m):
+def put9(a: Array, m: Matrix) -> None:
     """Store matrix m in array a (9,)."""
     a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8] = m
 
 
 @inline_kernel
-def get6(a):
+def get6(a: Array) -> Symmetric:
     """The symmetric matrix stored in array a (6,)."""
     return a[0], a[1], a[2], a[3], a[4], a[5]
 
 
 @inline_kernel
-def put6(a, m):
+def put6(a: Array, m: Symmetric) -> None:
     """Store symmetric matrix m in array a (6,)."""
     a[0], a[1], a[2], a[3], a[4], a[5] = m
 
 
 @inline_kernel
-def plus(u, w):
+def plus(u: Vector, w: Vector) -> Vector:
     """The sum u + w."""
     return u[0] + w[0], u[1] + w[1], u[2] + w[2]
 
 
 @inline_kernel
-def minus(u, w):
+def minus(u: Vector, w: Vector) -> Vector:
     """The difference u - w."""
     return u[0] - w[0], u[1] - w[1], u[2] - w[2]
 
 
 @inline_kernel
-def scale(s, u):
+def scale(s: float, u: Vector) -> Vector:
     """The product s u."""
     return s * u[0], s * u[1], s * u[2]
 
 
 @inline_kernel
-def dot(u, w):
+def dot(u: Vector, w: Vector) -> float:
     """The inner product u . w."""
     return u[0] * w[0] + u[1] * w[1] + u[2] * w[2]
 
 
 @inline_kernel
-def cross(u, w):
+def cross(u: Vector, w: Vector) -> Vector:
     """The vector product u x w."""
     return u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]
 
 
 @inline_kernel
-def times(m, u):
+def times(m: Matrix, u: Vector) -> Vector:
     """The product m u of a 3x3 matrix and a vector."""
     return (
         m[0] * u[0] + m[1] * u[1] + m[2] * u[2],
@@ -94,7 +95,7 @@ def times(m, u):
 
 
 @inline_kernel
-def transposed_times(m, u):
+def transposed_times(m: Matrix, u: Vector) -> Vector:
     """The product m^T u."""
     return (
         m[0] * u[0] + m[3] * u[1] + m[6] * u[2],
@@ -104,7 +105,7 @@ def transposed_times(m, u):
 
 
 @inline_kernel
-def symmetric_times(m, u):
+def symmetric_times(m: Symmetric, u: Vector) -> Vector:
     """The product m u of a symmetric matrix (6-tuple) and a vector."""
     return (
         m[0] * u[0] + m[1] * u[1] + m[2] * u[2],
@@ -114,7 +115,7 @@ def symmetric_times(m, u):
 
 
 @inline_kernel
-def product(a, b):
+def product(a: Matrix, b: Matrix) -> Matrix:
     """The product a b of 3x3 matrices."""
     return (
         a[0] * b[0] + a[1] * b[3] + a[2] * b[6],
@@ -130,13 +131,13 @@ def product(a, b):
 
 
 @inline_kernel
-def minus9(a):
+def minus9(a: Matrix) -> Matrix:
     """The matrix -a."""
     return -a[0], -a[1], -a[2], -a[3], -a[4], -a[5], -a[6], -a[7], -a[8]
 
 
 @inline_kernel
-def minus_outer(a, u, w):
+def minus_outer(a: Matrix, u: Vector, w: Vector) -> Matrix:
     """The matrix a - u w^T."""
     return (
         a[0] - u[0] * w[0],
@@ -152,7 +153,7 @@ def minus_outer(a, u, w):
 
 
 @inline_kernel
-def difference9(a, b):
+def difference9(a: Matrix, b: Matrix) -> Matrix:
     """The matrix a - b."""
     return (
         a[0] - b[0],
@@ -168,13 +169,13 @@ def difference9(a, b):
 
 
 @inline_kernel
-def scale9(s, a):
+def scale9(s: float, a: Matrix) -> Matrix:
     """The matrix s a."""
     return s * a[0], s * a[1], s * a[2], s * a[3], s * a[4], s * a[5], s * a[6], s * a[7], s * a[8]
 
 
 @inline_kernel
-def sum9(a, b):
+def sum9(a: Matrix, b: Matrix) -> Matrix:
     """The matrix a + b."""
     return (
         a[0] + b[0],
@@ -190,20 +191,20 @@ def sum9(a, b):
 
 
 @inline_kernel
-def rows_crossed(u, a):
+def rows_crossed(u: Vector, a: Matrix) -> Matrix:
     """The matrix whose rows are u x (row of a)."""
     p, q, r = cross(u, (a[0], a[1], a[2])), cross(u, (a[3], a[4], a[5])), cross(u, (a[6], a[7], a[8]))
     return p[0], p[1], p[2], q[0], q[1], q[2], r[0], r[1], r[2]
 
 
 @inline_kernel
-def full(m):
+def full(m: Symmetric) -> Matrix:
     """A symmetric 6-tuple as a 9-tuple."""
     return m[0], m[1], m[2], m[1], m[3], m[4], m[2], m[4], m[5]
 
 
 @inline_kernel
-def rotated_inertia(R, m):
+def rotated_inertia(R: Matrix, m: Symmetric) -> Symmetric:
     """The symmetric matrix R m R^T, m a symmetric 6-tuple."""
     a = product(R, full(m))
     return (
@@ -217,7 +218,7 @@ def rotated_inertia(R, m):
 
 
 @inline_kernel
-def symmetric_inverse(m):
+def symmetric_inverse(m: Symmetric) -> Symmetric:
     """The inverse of a symmetric 6-tuple by cofactors."""
     c0 = m[3] * m[5] - m[4] * m[4]
     c1 = m[2] * m[4] - m[1] * m[5]
@@ -234,7 +235,7 @@ def symmetric_inverse(m):
 
 
 @inline_kernel
-def solve3(m, u):
+def solve3(m: Matrix, u: Vector) -> Vector:
     """The solution x of m x = u for a 3x3 matrix (9-tuple) by cofactors."""
     c0 = m[4] * m[8] - m[5] * m[7]
     c1 = m[5] * m[6] - m[3] * m[8]
@@ -248,7 +249,7 @@ def solve3(m, u):
 
 
 @inline_kernel
-def rotation_of(w, x, y, z):
+def rotation_of(w: float, x: float, y: float, z: float) -> Matrix:
     """The rotation matrix of a unit quaternion (design eq. 1, the element (1, 3) corrected)."""
     return (
         1.0 - 2.0 * (y * y + z * z),

@@ -32,10 +32,11 @@ from physics_prior.dynamics.algebra import (
 )
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import FREE, PRISMATIC, REVOLUTE
+from physics_prior.dynamics.types import Array, Matrix, Record, Records, Symmetric, Vector
 
 
 @inline_kernel
-def shift_to_parent(up, arm, J, H, M):
+def shift_to_parent(up: Record, arm: Vector, J: Symmetric, H: Matrix, M: Symmetric) -> None:
     """Add an articulated inertia about a joint to the parent link's, whose origin is ``arm`` before it."""
     x, y, z = arm
     m0, m1, m2, m3, m4, m5 = M
@@ -67,7 +68,7 @@ def shift_to_parent(up, arm, J, H, M):
 
 
 @inline_kernel
-def shift_mass_to_parent(up, arm, M):
+def shift_mass_to_parent(up: Record, arm: Vector, M: Symmetric) -> None:
     """Add an articulated mass at a joint, all that a ball joint passes on, to the parent link's inertia."""
     x, y, z = arm
     m0, m1, m2, m3, m4, m5 = M
@@ -94,7 +95,7 @@ def shift_mass_to_parent(up, arm, M):
 
 
 @inline_kernel
-def _schur(M, H, K):
+def _schur(M: Symmetric, H: Matrix, K: Matrix) -> Symmetric:
     """The symmetric matrix M - H^T K, K = J^-1 H: the mass felt through a ball joint."""
     return (
         M[0] - (H[0] * K[0] + H[3] * K[3] + H[6] * K[6]),
@@ -107,7 +108,7 @@ def _schur(M, H, K):
 
 
 @inline_kernel
-def _symmetric_product(a, h):
+def _symmetric_product(a: Symmetric, h: Matrix) -> Matrix:
     """The product of a symmetric 6-tuple and a 9-tuple."""
     return (
         a[0] * h[0] + a[1] * h[3] + a[2] * h[6],
@@ -123,7 +124,7 @@ def _symmetric_product(a, h):
 
 
 @inline_kernel
-def rigid_inertias(links, work):
+def rigid_inertias(links: Records, work: Records) -> None:
     """Fill J, H and M of every link with those of the rigid link about its own joint; needs the kinematics."""
     work[0].factored = 0
     for i in range(links.shape[0]):
@@ -147,7 +148,7 @@ def rigid_inertias(links, work):
 
 
 @kernel
-def factorize(links, work):
+def factorize(links: Records, work: Records) -> None:
     """Fill the articulated inertias of all links, inward; needs the kinematics."""
     rigid_inertias(links, work)
     for i in range(links.shape[0] - 1, -1, -1):
@@ -157,15 +158,15 @@ def factorize(links, work):
             s = get3(here.axis)
             if link.kind == REVOLUTE:
                 n, f = symmetric_times(J, s), transposed_times(H, s)
-                inverse = 1.0 / dot(s, n)
+                D = 1.0 / dot(s, n)
             else:
                 n, f = times(H, s), symmetric_times(M, s)
-                inverse = 1.0 / dot(s, f)
+                D = 1.0 / dot(s, f)
             put3(here.U_moment, n)
             put3(here.U_force, f)
-            here.D = inverse
+            here.D = D
             if link.parent >= 0:
-                a, b = scale(inverse, n), scale(inverse, f)
+                a, b = scale(D, n), scale(D, f)
                 J = (
                     J[0] - a[0] * n[0],
                     J[1] - a[0] * n[1],
@@ -212,7 +213,7 @@ def factorize(links, work):
 
 
 @kernel
-def accelerate(links, work, tau, gravity, vdot):
+def accelerate(links: Records, work: Records, tau: Array, gravity: Array, vdot: Array) -> None:
     """Fill vdot (nv,) from generalized forces tau (nv,), external wrenches, velocities and gravity (3,).
 
     Needs ``move`` and ``factorize``. Spherical entries of tau and vdot are in the link's axes, the linear ones of a free
@@ -288,7 +289,9 @@ def accelerate(links, work, tau, gravity, vdot):
 
 
 @kernel
-def push(links, work, link_index, point, forces, count, y, z):
+def push(
+    links: Records, work: Records, link_index: int, point: Vector, forces: Matrix, count: int, y: Array, z: Array
+) -> None:
     """Run forces at a world point on a link inward through the factors: add S^T w to y and D^-1 S^T w to z.
 
     forces is a 3x3 matrix whose first ``count`` rows are forces; y and z (count, w) have the columns of the degrees of freedom
@@ -330,7 +333,7 @@ def push(links, work, link_index, point, forces, count, y, z):
 
 
 @kernel
-def push_generalized(links, work, tau, z):
+def push_generalized(links: Records, work: Records, tau: Array, z: Array) -> None:
     """Run generalized forces tau (nv,) inward through the factors: fill z (nv,) = D^-1 (what is left of them).
 
     z has its entries in the order of the links' columns, those of ball joints in world axes.
@@ -368,7 +371,7 @@ def push_generalized(links, work, tau, z):
 
 
 @kernel
-def pull(links, work, z, vdot):
+def pull(links: Records, work: Records, z: Array, vdot: Array) -> None:
     """Run z (nv,) outward through the factors: fill vdot (nv,) = M^-1 tau, and the links' increments of acceleration."""
     for i in range(links.shape[0]):
         link, here = links[i], work[i]

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from physics_prior.dynamics.kernel import cache_directory, inline_kernel
+from physics_prior.dynamics.types import Array
 from physics_prior.effects.effect import Effect
 from physics_prior.model import Tree
 
@@ -34,7 +35,7 @@ def pack_parameters(tree: Tree, effects: Sequence[Effect]) -> np.ndarray:
 
 
 @inline_kernel
-def section(parameters, index):
+def section(parameters: Array, index: int) -> Array:
     """The numbers of the index-th force effect."""
     return parameters[int(parameters[GRAVITY + index]) : int(parameters[GRAVITY + index + 1])]
 

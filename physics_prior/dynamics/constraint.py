@@ -29,6 +29,7 @@ from physics_prior.dynamics.articulated_body import factorize, pull, push
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import flow, pose, weigh
 from physics_prior.dynamics.manifold import displace
+from physics_prior.dynamics.types import Array, Record, Records, Vector
 
 REGULARISATION = 1e-10  # of the mean diagonal: small steps are not safer near a singular configuration (design eq. 11)
 DEPENDENT = 1e3  # a pivot within this factor of the regularisation belongs to a row that adds nothing
@@ -39,13 +40,13 @@ POSITION_ITERATIONS = 12
 
 
 @inline_kernel
-def direction(pair, row):
+def direction(pair: Record, row: int) -> Vector:
     """The unit vector of a row, world axes."""
     return pair.d[3 * row], pair.d[3 * row + 1], pair.d[3 * row + 2]
 
 
 @kernel
-def place(work, pairs):
+def place(work: Records, pairs: Records) -> None:
     """Fill points and directions of all pairs in the world; needs the kinematics."""
     for p in range(pairs.shape[0]):
         pair = pairs[p]
@@ -70,13 +71,13 @@ def place(work, pairs):
 
 
 @inline_kernel
-def point_velocity(on, point):
+def point_velocity(on: Record, point: Vector) -> Vector:
     """Velocity of a world point that moves with a link."""
     return plus(get3(on.velocity), cross(get3(on.omega), minus(point, get3(on.origin))))
 
 
 @inline_kernel
-def point_acceleration(on, point):
+def point_acceleration(on: Record, point: Vector) -> Vector:
     """Acceleration (less gravity) of a world point that moves with a link."""
     lever, omega = minus(point, get3(on.origin)), get3(on.omega)
     turning = plus(cross(get3(on.alpha), lever), cross(omega, cross(omega, lever)))
@@ -84,7 +85,7 @@ def point_acceleration(on, point):
 
 
 @kernel
-def position_error(pairs, out):
+def position_error(pairs: Records, out: Array) -> float:
     """Fill out (m,) with the rows' errors, m, NEGATED; return the largest magnitude. Needs ``place``."""
     worst = 0.0
     for p in range(pairs.shape[0]):
@@ -100,7 +101,7 @@ def position_error(pairs, out):
 
 
 @inline_kernel
-def approach(work, pair):
+def approach(work: Records, pair: Record) -> Vector:
     """Velocity of point b less that of link a where the force holds it, m/s."""
     rate = ZERO
     if pair.link_b >= 0:
@@ -111,7 +112,7 @@ def approach(work, pair):
 
 
 @kernel
-def velocity_error(work, pairs, out):
+def velocity_error(work: Records, pairs: Records, out: Array) -> None:
     """Fill out (m,) with the rows' velocities, m/s, NEGATED."""
     for p in range(pairs.shape[0]):
         pair = pairs[p]
@@ -121,7 +122,7 @@ def velocity_error(work, pairs, out):
 
 
 @inline_kernel
-def relative_acceleration(work, pair, gravity):
+def relative_acceleration(work: Records, pair: Record, gravity: Array) -> Vector:
     """Acceleration of point b as link a sees it, but for the turning of a rod, m/s^2."""
     between = (-gravity[0], -gravity[1], -gravity[2])
     if pair.link_b >= 0:
@@ -137,7 +138,7 @@ def relative_acceleration(work, pair, gravity):
 
 
 @kernel
-def acceleration_error(work, pairs, gravity, out):
+def acceleration_error(work: Records, pairs: Records, gravity: Array, out: Array) -> None:
     """Fill out (m,) with the rows' accelerations under the links' present ones, m/s^2 (A vdot + Adot v), NEGATED."""
     for p in range(pairs.shape[0]):
         pair = pairs[p]
@@ -153,13 +154,13 @@ def acceleration_error(work, pairs, gravity, out):
 
 
 @inline_kernel
-def width(rows):
+def width(rows: Array) -> int:
     """The number of degrees of freedom that the rows move."""
-    return (rows.shape[1] - 2 * rows.shape[0] - 3) // 2
+    return int((rows.shape[1] - 2 * rows.shape[0] - 3) // 2)
 
 
 @kernel
-def assemble(links, work, pairs, rows):
+def assemble(links: Records, work: Records, pairs: Records, rows: Array) -> int:
     """Fill Y, Z, A M^-1 A^T and its regularised Cholesky factor; return the rank. Needs factors and ``place``.
 
     The factor is L D L^T with unit L, here also above the diagonal, in which stands D inverted.
@@ -207,7 +208,7 @@ def assemble(links, work, pairs, rows):
 
 
 @kernel
-def multiply(rows):
+def multiply(rows: Array) -> None:
     """Solve A M^-1 A^T answer = right side, proximally; fills the answer, spoils the right side."""
     m, w = rows.shape[0], width(rows)
     left, answer, change = 2 * w + 2 * m, 2 * w + 2 * m + 1, 2 * w + 2 * m + 2
@@ -242,7 +243,7 @@ def multiply(rows):
 
 
 @kernel
-def respond(links, work, rows, z, vdot):
+def respond(links: Records, work: Records, rows: Array, z: Array, vdot: Array) -> None:
     """Fill vdot (nv,) = M^-1 A^T answer, and the links' increments of acceleration. z (nv,) is scratch."""
     m, w = rows.shape[0], width(rows)
     answer = rows[:, 2 * w + 2 * m + 1]
@@ -255,7 +256,7 @@ def respond(links, work, rows, z, vdot):
 
 
 @kernel
-def refresh(links, work, pairs, rows, known, q):
+def refresh(links: Records, work: Records, pairs: Records, rows: Array, known: Array, q: Array) -> int:
     """Have the factors and rows of q (nq,) in the workspace, if they are not there yet; return the rank."""
     nq = q.shape[0]
     if work[0].factored:
@@ -270,7 +271,7 @@ def refresh(links, work, pairs, rows, known, q):
 
 
 @kernel
-def complete(links, work, pairs, rows, known, q):
+def complete(links: Records, work: Records, pairs: Records, rows: Array, known: Array, q: Array) -> int:
     """Fill the factors and rows of q (nq,), poses and pairs being there; return the rank."""
     weigh(links, work)
     factorize(links, work)
@@ -283,7 +284,9 @@ def complete(links, work, pairs, rows, known, q):
 
 
 @kernel
-def constrain_acceleration(links, work, pairs, rows, gravity, vdot, spare):
+def constrain_acceleration(
+    links: Records, work: Records, pairs: Records, rows: Array, gravity: Array, vdot: Array, spare: Array
+) -> None:
     """Add constraint forces to free accelerations: vdot (nv,) and the links'; fill pair.force.
 
     Needs ``refresh`` and ``accelerate``. The system is design eq. 4 with f_c = +A^T lambda, so that pair.force acts ON link
@@ -308,7 +311,7 @@ def constrain_acceleration(links, work, pairs, rows, gravity, vdot, spare):
 
 
 @kernel
-def load_links(work, pairs):
+def load_links(work: Records, pairs: Records) -> None:
     """Add the constraint forces to the external wrenches of the links, so that ``transmit`` sees them."""
     for p in range(pairs.shape[0]):
         pair = pairs[p]
@@ -325,7 +328,17 @@ def load_links(work, pairs):
 
 
 @kernel
-def project(links, work, pairs, rows, known, q, v, spare, tolerance):
+def project(
+    links: Records,
+    work: Records,
+    pairs: Records,
+    rows: Array,
+    known: Array,
+    q: Array,
+    v: Array,
+    spare: Array,
+    tolerance: float,
+) -> float:
     """Put q (nq,) and v (nv,) back onto the constraints in the mass metric; return the position error left, m.
 
     q moves by -M^-1 A^T (A M^-1 A^T)^-1 e until e is within tolerance, v by the same map of A v (design eq. 11). The factors of a

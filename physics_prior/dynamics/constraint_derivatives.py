@@ -14,6 +14,7 @@ from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import freedoms
 from physics_prior.dynamics.records import FREE
 from physics_prior.dynamics.spatial import add, at_point, cross_motion, get_spatial
+from physics_prior.dynamics.types import Array, Record, Records, Vector
 
 GAP = np.dtype(
     [
@@ -32,7 +33,9 @@ GAP = np.dtype(
 
 
 @kernel
-def differentiate_gap(links, work, freedom_records, composites, pair, gaps):
+def differentiate_gap(
+    links: Records, work: Records, freedom_records: Records, composites: Records, pair: Record, gaps: Records
+) -> None:
     """Fill gaps (nv,): the derivatives of where a pair's points are and how they move; needs ``sweep``, ``place``."""
     for k in range(gaps.shape[0]):
         gap = gaps[k]
@@ -66,7 +69,16 @@ def differentiate_gap(links, work, freedom_records, composites, pair, gaps):
 
 
 @inline_kernel
-def _differentiate_side(links, freedom_records, composites, pair, gaps, sign, link, p):
+def _differentiate_side(
+    links: Records,
+    freedom_records: Records,
+    composites: Records,
+    pair: Record,
+    gaps: Records,
+    sign: float,
+    link: int,
+    p: Vector,
+) -> None:
     """Add what the motion of one side's link does at its point p, and how the point moves."""
     if link >= 0:
         V, A = get_spatial(composites[link].V), get_spatial(composites[link].A)
@@ -105,7 +117,7 @@ def _differentiate_side(links, freedom_records, composites, pair, gaps, sign, li
 
 
 @inline_kernel
-def turned(pair, row, gap):
+def turned(pair: Record, row: int, gap: Record) -> Vector:
     """The derivative of a row's direction by a degree of freedom."""
     d = direction(pair, row)
     if pair.is_rod:
@@ -116,7 +128,20 @@ def turned(pair, row, gap):
 
 
 @kernel
-def differentiate_rows(links, work, pairs, freedom_records, composites, gravity, gaps, A, A_q, rows_q, rows_v, tau_q):
+def differentiate_rows(
+    links: Records,
+    work: Records,
+    pairs: Records,
+    freedom_records: Records,
+    composites: Records,
+    gravity: Array,
+    gaps: Records,
+    A: Array,
+    A_q: Array,
+    rows_q: Array,
+    rows_v: Array,
+    tau_q: Array,
+) -> None:
     """Fill the derivatives of all rows, and take those of A^T lambda from tau_q (nv, nv).
 
     A (m, nv): the constraint Jacobian. A_q (m, nv): derivative of A v by q. rows_q, rows_v (m, nv): of the rows'
@@ -150,7 +175,9 @@ def differentiate_rows(links, work, pairs, freedom_records, composites, gravity,
 
 
 @inline_kernel
-def _differentiate_transmission(links, pair, freedom_records, gaps, force, tau_q, base):
+def _differentiate_transmission(
+    links: Records, pair: Record, freedom_records: Records, gaps: Records, force: Vector, tau_q: Array, base: Vector
+) -> None:
     """Subtract from tau_q the derivative of A^T lambda at fixed multipliers."""
     nv = gaps.shape[0]
     for side in range(2):

@@ -9,7 +9,7 @@ import numpy as np
 from physics_prior.dynamics.algebra import cross, get3, get6, minus, plus, scale, symmetric_times
 from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.articulated_body import pull, push_generalized
-from physics_prior.dynamics.gyroscopic import middle_correction
+from physics_prior.dynamics.gyroscopic import middle_correction, turning_inertia
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import freedom, freedoms
 from physics_prior.dynamics.records import FREE, SPHERICAL
@@ -24,6 +24,7 @@ from physics_prior.dynamics.spatial import (
     put_spatial,
     rows_times,
 )
+from physics_prior.dynamics.types import Array, Records, Spatial, Symmetric, Vector
 
 FREEDOM = np.dtype(
     [
@@ -50,14 +51,16 @@ COMPOSITE = np.dtype(
 
 
 @inline_kernel
-def _rigid(inertia, mass, center, u):
+def _rigid(inertia: Symmetric, mass: float, center: Vector, u: Spatial) -> Spatial:
     """The momentum of motion u: (angular about the reference point, linear)."""
     linear = scale(mass, at_point(u, center))
     return plus(symmetric_times(inertia, u[0]), cross(center, linear)), linear
 
 
 @kernel
-def sweep(links, work, gravity, step, freedom_records, composites):
+def sweep(
+    links: Records, work: Records, gravity: Array, step: float, freedom_records: Records, composites: Records
+) -> None:
     """Fill freedoms (nv,) and composites (N,) from velocities and accelerations in the workspace.
 
     step > 0 differentiates the gyroscopic torque in its midpoint form for that step, 0 the explicit one.
@@ -96,6 +99,7 @@ def sweep(links, work, gravity, step, freedom_records, composites):
             put_spatial(record.psi_ddot, add(cross_motion(A_up, S), cross_motion(V_up, psi_dot)))
         inertia, mass, center = get6(here.inertia), link.mass, plus(d, get3(here.center))
         momentum = _rigid(inertia, mass, center, V)
+        turning = turning_inertia(link, here)
         middle = step > 0.0 and (link.kind == SPHERICAL or link.kind == FREE) and mass > 0.0
         for k in range(6):
             turn = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
@@ -107,7 +111,7 @@ def sweep(links, work, gravity, step, freedom_records, composites):
             Bu = add(cross_force(V, Iu), cross_force(u, momentum))
             Bu = (minus(Bu[0], Ivu[0]), minus(Bu[1], Ivu[1]))
             if middle and k < 3:
-                Bu = (plus(Bu[0], middle_correction(inertia, omega, step, turn)), Bu[1])
+                Bu = (plus(Bu[0], middle_correction(turning, omega, step, turn)), Bu[1])
             put_spatial(own.B[6 * k : 6 * k + 6], Bu)
         lever = get3(here.center)
         force = scale(
@@ -127,7 +131,9 @@ def sweep(links, work, gravity, step, freedom_records, composites):
 
 
 @kernel
-def inverse_dynamics_derivatives(links, freedom_records, composites, tau_q, tau_v):
+def inverse_dynamics_derivatives(
+    links: Records, freedom_records: Records, composites: Records, tau_q: Array, tau_v: Array
+) -> None:
     """Fill the derivatives of inverse dynamics at fixed vdot, (nv, nv) each, after ``sweep``; no external forces."""
     clear(tau_q)
     clear(tau_v)
@@ -161,7 +167,7 @@ def inverse_dynamics_derivatives(links, freedom_records, composites, tau_q, tau_
 
 
 @kernel
-def apply_inverse_mass(links, work, columns, spare):
+def apply_inverse_mass(links: Records, work: Records, columns: Array, spare: Array) -> None:
     """Replace every row of columns (k, nv), a generalized force, by the acceleration M^-1 of it. spare (2, nv)."""
     for r in range(columns.shape[0]):
         push_generalized(links, work, columns[r], spare[0])

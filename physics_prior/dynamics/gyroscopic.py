@@ -2,7 +2,7 @@
 
 The explicit torque omega x I omega feeds energy into a fast top (numerics 3.1). Euler's equation of the free body solved by
 the implicit midpoint rule, I (w+ - w) + h wm x I wm = 0 with wm = (w + w+)/2, keeps its energy at any h; the torque of that
-solution is what the semi-implicit step applies to links on ball and free joints.
+solution is what the semi-implicit step applies to links on ball and free joints, about the point that they turn about.
 """
 
 from physics_prior.dynamics.algebra import (
@@ -23,13 +23,14 @@ from physics_prior.dynamics.algebra import (
 )
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import FREE, SPHERICAL
+from physics_prior.dynamics.types import Matrix, Records, Symmetric, Vector
 
 NEWTON_ITERATIONS = 20
 NEWTON_TOLERANCE = 1e-24  # of the square of the angular velocity: the next change is smaller by step * change
 
 
 @inline_kernel
-def spin_matrix(inertia, omega):
+def spin_matrix(inertia: Symmetric, omega: Vector) -> Matrix:
     """The derivative of omega x I omega by omega: [omega]x I - [I omega]x, a 9-tuple."""
     i = full(inertia)
     x, y, z = omega
@@ -48,7 +49,7 @@ def spin_matrix(inertia, omega):
 
 
 @inline_kernel
-def middle_rate(inertia, omega, step):
+def middle_rate(inertia: Symmetric, omega: Vector, step: float) -> Vector:
     """The angular velocity in the middle of a free body's step, by Newton's method with its first slope."""
     after = omega
     slope = sum9(full(inertia), scale9(0.5 * step, spin_matrix(inertia, omega)))
@@ -66,7 +67,7 @@ def middle_rate(inertia, omega, step):
 
 
 @kernel
-def take_at_middle(links, work, step):
+def take_at_middle(links: Records, work: Records, step: float) -> None:
     """Replace the gyroscopic torque of links on ball and free joints by that of the middle of the step."""
     for i in range(links.shape[0]):
         if (links[i].kind == SPHERICAL or links[i].kind == FREE) and links[i].mass > 0.0:
@@ -77,7 +78,7 @@ def take_at_middle(links, work, step):
 
 
 @inline_kernel
-def middle_correction(inertia, omega, step, direction):
+def middle_correction(inertia: Symmetric, omega: Vector, step: float, direction: Vector) -> Vector:
     """How much more the middle torque changes along a direction of omega than the explicit one.
 
     From the implicit equation: (I + h/2 K) dw+ = (I - h/2 K) dw, K the spin matrix at wm, torque = -I (w+ - w) / h.

@@ -6,7 +6,7 @@ import platform
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import llvmlite
 import numba
@@ -14,6 +14,8 @@ import numpy as np
 
 FASTMATH = {"nsz", "arcp", "contract", "reassoc", "afn"}
 """Everything but nnan and ninf: a NaN stays visible."""
+
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 _KERNEL_ROOMS = ("dynamics", "effects", "estimation")
 
@@ -42,23 +44,24 @@ def cache_directory() -> Path:
     return Path(home) / digest.hexdigest()[:16]
 
 
-def kernel(function: Callable[..., Any]) -> Any:
+def kernel(function: Function) -> Function:
     """Compile a function of the step: no Python in it, cached on disk, IEEE division, NaN visible."""
     return _compile(function, inline=False)
 
 
-def inline_kernel(function: Callable[..., Any]) -> Any:
+def inline_kernel(function: Function) -> Function:
     """Compile a small helper (3-vector algebra) that the optimiser is told to inline."""
     return _compile(function, inline=True)
 
 
-def _compile(function: Callable[..., Any], inline: bool) -> Any:
+def _compile(function: Function, inline: bool) -> Function:
     # Numba reads its cache directory when it decorates: set it for our functions only
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(cache_directory())
     try:
-        return numba.njit(cache=True, error_model="numpy", fastmath=FASTMATH, forceinline=inline, boundscheck=False)(
-            function
-        )
+        compiled: Function = numba.njit(
+            cache=True, error_model="numpy", fastmath=FASTMATH, forceinline=inline, boundscheck=False
+        )(function)
+        return compiled
     finally:
         numba.config.CACHE_DIR = before

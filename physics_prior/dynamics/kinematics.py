@@ -25,10 +25,11 @@ from physics_prior.dynamics.algebra import (
 from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import FREE, PRISMATIC, REVOLUTE, SPHERICAL
+from physics_prior.dynamics.types import Array, Matrix, Record, Records, Spatial, Vector
 
 
 @kernel
-def move(links, work, q, v):
+def move(links: Records, work: Records, q: Array, v: Array) -> None:
     """Fill poses, velocities and velocity-product accelerations of all links from q (nq,) and v (nv,), outward.
 
     World axes throughout, each link about its own joint, so that inertias shift but never rotate. External forces are
@@ -40,7 +41,7 @@ def move(links, work, q, v):
 
 
 @kernel
-def pose(links, work, q):
+def pose(links: Records, work: Records, q: Array) -> None:
     """Fill where the links are."""
     work[0].factored = 0
     for i in range(links.shape[0]):
@@ -74,7 +75,7 @@ def pose(links, work, q):
 
 
 @kernel
-def weigh(links, work):
+def weigh(links: Records, work: Records) -> None:
     """Fill centres of mass and inertias of the links in world axes; needs ``pose``."""
     for i in range(links.shape[0]):
         link, here = links[i], work[i]
@@ -84,7 +85,7 @@ def weigh(links, work):
 
 
 @kernel
-def flow(links, work, v):
+def flow(links: Records, work: Records, v: Array) -> None:
     """Fill velocities, what they add to accelerations, and gyroscopic torques; needs ``pose`` and ``weigh``."""
     for i in range(links.shape[0]):
         link, here = links[i], work[i]
@@ -123,7 +124,7 @@ def flow(links, work, v):
 
 
 @inline_kernel
-def turned_about(R, local, axis, angle):
+def turned_about(R: Matrix, local: Vector, axis: Vector, angle: float) -> Matrix:
     """The rotation matrix R turned by an angle about a unit axis, ``local`` in R's axes and ``axis`` = R local (Rodrigues)."""
     s, c = math.sin(angle), math.cos(angle)
     k = scale(1.0 - c, axis)
@@ -144,13 +145,13 @@ def turned_about(R, local, axis, angle):
 
 
 @inline_kernel
-def freedoms(kind):
+def freedoms(kind: int) -> int:
     """Number of degrees of freedom of a joint."""
     return 1 if kind in (REVOLUTE, PRISMATIC) else (6 if kind == FREE else 3)
 
 
 @inline_kernel
-def freedom(kind, here, c):
+def freedom(kind: int, here: Record, c: int) -> Spatial:
     """The c-th direction of motion of a joint: angular velocity and velocity of its origin, world axes, per unit of v."""
     turn, shift = ZERO, ZERO
     if kind == REVOLUTE:
@@ -166,7 +167,7 @@ def freedom(kind, here, c):
 
 
 @kernel
-def point_jacobian(links, work, link_index, point, jacobian):
+def point_jacobian(links: Records, work: Records, link_index: int, point: Array, jacobian: Array) -> None:
     """Fill jacobian (6, nv): angular velocity (rows 0-2) and velocity of a point (rows 3-5), world axes, per v.
 
     point (3,) stands in the link's frame, m. Columns of joints that do not carry the link are zero.
@@ -187,7 +188,7 @@ def point_jacobian(links, work, link_index, point, jacobian):
 
 
 @kernel
-def energy(links, work, gravity):
+def energy(links: Records, work: Records, gravity: Array) -> float:
     """Kinetic energy plus potential energy in the uniform field gravity (3,), J, zero at the world's origin."""
     total = 0.0
     for i in range(links.shape[0]):

@@ -9,10 +9,11 @@ import math
 from physics_prior.dynamics.algebra import cross, plus, scale
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import FREE, SPHERICAL
+from physics_prior.dynamics.types import Array, Matrix, Records, Vector
 
 
 @inline_kernel
-def exponential(x, y, z):
+def exponential(x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """The unit quaternion of a rotation vector, safe at zero."""
     square = x * x + y * y + z * z
     if square < 1e-8:
@@ -25,7 +26,7 @@ def exponential(x, y, z):
 
 
 @inline_kernel
-def _skew_polynomial(theta, first, second):
+def _skew_polynomial(theta: Vector, first: float, second: float) -> Matrix:
     """The matrix I + first [theta]x + second [theta]x^2."""
     x, y, z = theta
     return (
@@ -42,7 +43,7 @@ def _skew_polynomial(theta, first, second):
 
 
 @inline_kernel
-def rotation_back(theta):
+def rotation_back(theta: Vector) -> Matrix:
     """The matrix exp(theta)^T: how an error before a turn by theta reads after it."""
     square = theta[0] * theta[0] + theta[1] * theta[1] + theta[2] * theta[2]
     if square < 1e-8:
@@ -52,7 +53,7 @@ def rotation_back(theta):
 
 
 @inline_kernel
-def right_jacobian(theta):
+def right_jacobian(theta: Vector) -> Matrix:
     """The right Jacobian of the exponential map (Sola 2017, eq. 183)."""
     square = theta[0] * theta[0] + theta[1] * theta[1] + theta[2] * theta[2]
     if square < 1e-6:
@@ -62,7 +63,7 @@ def right_jacobian(theta):
 
 
 @inline_kernel
-def local_rate(theta, omega):
+def local_rate(theta: Vector, omega: Vector) -> Vector:
     """The rate of the rotation vector theta under body angular velocity omega, to the order RK4 needs.
 
     theta_dot = omega + 1/2 theta x omega + 1/12 theta x (theta x omega): the inverse right Jacobian, next term O(theta^4).
@@ -72,7 +73,7 @@ def local_rate(theta, omega):
 
 
 @inline_kernel
-def local_rate_by_theta(theta, omega, direction):
+def local_rate_by_theta(theta: Vector, omega: Vector, direction: Vector) -> Vector:
     """The derivative of local_rate by theta along a direction."""
     once = cross(theta, omega)
     turned = cross(direction, omega)
@@ -80,15 +81,15 @@ def local_rate_by_theta(theta, omega, direction):
 
 
 @kernel
-def displace(links, q, delta, out):
+def displace(links: Records, q: Array, delta: Array, out: Array) -> None:
     """Fill out (nq,) = q [+] delta; q and out may be the same array. Quaternions leave with unit norm."""
     for i in range(links.shape[0]):
         link = links[i]
         k, n = link.q, link.v
         if link.kind == SPHERICAL or link.kind == FREE:
             if link.kind == FREE:
-                for c in range(3):
-                    out[k + c] = q[k + c] + delta[n + c]
+                for e in range(3):
+                    out[k + e] = q[k + e] + delta[n + e]
                 k, n = k + 3, n + 3
             w, x, y, z = q[k], q[k + 1], q[k + 2], q[k + 3]
             a, b, c, d = exponential(delta[n], delta[n + 1], delta[n + 2])
@@ -103,7 +104,7 @@ def displace(links, q, delta, out):
 
 
 @kernel
-def rate(links, theta, v, out):
+def rate(links: Records, theta: Array, v: Array, out: Array) -> None:
     """Fill out (nv,): the rate of the local coordinates theta (nv,) under velocity v (nv,)."""
     for i in range(links.shape[0]):
         link = links[i]
@@ -121,7 +122,7 @@ def rate(links, theta, v, out):
 
 
 @kernel
-def rate_derivative(links, theta, v, theta_x, v_x, out):
+def rate_derivative(links: Records, theta: Array, v: Array, theta_x: Array, v_x: Array, out: Array) -> None:
     """Fill out (nv, k): the derivative of ``rate`` from those of theta and v, (nv, k) each."""
     columns = out.shape[1]
     for i in range(links.shape[0]):
@@ -145,7 +146,7 @@ def rate_derivative(links, theta, v, theta_x, v_x, out):
 
 
 @kernel
-def displacement_derivative(links, theta, start_x, theta_x, out):
+def displacement_derivative(links: Records, theta: Array, start_x: Array, theta_x: Array, out: Array) -> None:
     """Fill out (nv, k): the tangent error at q0 [+] theta from those of q0 and theta, (nv, k) each."""
     columns = out.shape[1]
     for i in range(links.shape[0]):

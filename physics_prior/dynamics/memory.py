@@ -5,6 +5,7 @@ step takes one array, and both sides see its sections as the records and matrice
 """
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numba import carray, types
@@ -14,6 +15,7 @@ from physics_prior.dynamics.constraint_derivatives import GAP
 from physics_prior.dynamics.derivatives import COMPOSITE, FREEDOM
 from physics_prior.dynamics.kernel import inline_kernel
 from physics_prior.dynamics.records import LINK, PAIR, WORK
+from physics_prior.dynamics.types import Array
 
 HEAD = 8
 LINK_SIZE, WORK_SIZE, PAIR_SIZE = LINK.itemsize // 8, WORK.itemsize // 8, PAIR.itemsize // 8
@@ -59,10 +61,10 @@ class Memory:
 
 
 @intrinsic
-def address(_typing_context, array, index):
+def address(_typing_context: Any, array: Any, index: Any) -> Any:
     """The address of an element of an array, for ``carray``."""
 
-    def build(context, builder, signature, arguments):
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
         return builder.bitcast(builder.gep(data, [arguments[1]]), context.get_value_type(types.voidptr))
 
@@ -70,7 +72,7 @@ def address(_typing_context, array, index):
 
 
 @inline_kernel
-def sections(memory):
+def sections(memory: Array) -> Any:
     """The sections of the memory, as kernels see them: links, work, pairs, rows, known, start, spare, parameters.
 
     Bare arrays at addresses in the memory, which the caller holds: views would count references at 5 ns each.
@@ -103,7 +105,7 @@ def tangent_memory(n: int, m: int, nv: int) -> np.ndarray:
 
 
 @inline_kernel
-def tangent_sections(tangent, n, m, nv):
+def tangent_sections(tangent: Array, n: int, m: int, nv: int) -> Any:
     """The sections: derivative (2 nv, nv), matrices (2 nv + 4 m, nv), stages (7, nv, 2 nv), freedoms, composites, gaps."""
     a = 2 * nv * nv
     b = a + (2 * nv + 4 * m) * nv

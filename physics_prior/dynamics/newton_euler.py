@@ -24,10 +24,11 @@ from physics_prior.dynamics.articulated_body import rigid_inertias, shift_to_par
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kinematics import freedom, freedoms
 from physics_prior.dynamics.records import FREE, PRISMATIC, REVOLUTE
+from physics_prior.dynamics.types import Array, Records
 
 
 @kernel
-def spread(links, work, vdot, gravity):
+def spread(links: Records, work: Records, vdot: Array, gravity: Array) -> None:
     """Fill alpha and acceleration (less gravity) of all links from vdot (nv,), outward; needs the kinematics."""
     for i in range(links.shape[0]):
         link, here = links[i], work[i]
@@ -53,7 +54,7 @@ def spread(links, work, vdot, gravity):
 
 
 @kernel
-def transmit(links, work):
+def transmit(links: Records, work: Records) -> None:
     """Fill bias_moment and bias_force with the wrench ON each link BY its joint, at the joint, world axes; inward.
 
     Needs accelerations and external wrenches. It is what moves the link and all it carries, less what else pushes them.
@@ -76,7 +77,7 @@ def transmit(links, work):
 
 
 @kernel
-def inverse_dynamics(links, work, vdot, gravity, tau):
+def inverse_dynamics(links: Records, work: Records, vdot: Array, gravity: Array, tau: Array) -> None:
     """Fill tau (nv,), the generalized forces that produce vdot (nv,) beside external wrenches and gravity (3,)."""
     spread(links, work, vdot, gravity)
     transmit(links, work)
@@ -95,7 +96,7 @@ def inverse_dynamics(links, work, vdot, gravity, tau):
 
 
 @kernel
-def mass_matrix(links, work, M):
+def mass_matrix(links: Records, work: Records, M: Array) -> None:
     """Fill M (nv, nv) from composite inertias; needs the kinematics and overwrites the factors."""
     clear(M)
     rigid_inertias(links, work)

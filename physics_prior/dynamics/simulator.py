@@ -118,7 +118,9 @@ class Simulator:
         constraints.
         """
         F, G = np.empty((2 * self.nv, 2 * self.nv)), np.empty((2 * self.nv, 2 * self.nv))
-        self.rank = self.step.linearise(self.memory.array, self.tangent_array(), q, v, self._still, h, force_noise, F, G)
+        self.rank = self.step.linearise(
+            self.memory.array, self.tangent_array(), q, v, self._still, h, force_noise, F, G
+        )
         return F, G
 
     def project(self, q: np.ndarray, v: np.ndarray) -> float:

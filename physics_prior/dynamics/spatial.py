@@ -5,53 +5,54 @@ A motion is (angular, linear), a force is (moment, force).
 
 from physics_prior.dynamics.algebra import cross, dot, get3, plus, put3
 from physics_prior.dynamics.kernel import inline_kernel
+from physics_prior.dynamics.types import Array, Spatial, Vector
 
 
 @inline_kernel
-def get_spatial(a):
+def get_spatial(a: Array) -> Spatial:
     """The spatial vector stored in array a (6,)."""
     return get3(a[0:3]), get3(a[3:6])
 
 
 @inline_kernel
-def put_spatial(a, u):
+def put_spatial(a: Array, u: Spatial) -> None:
     """Store spatial vector u in array a (6,)."""
     put3(a[0:3], u[0])
     put3(a[3:6], u[1])
 
 
 @inline_kernel
-def add(u, w):
+def add(u: Spatial, w: Spatial) -> Spatial:
     """The sum of two spatial vectors of a kind."""
     return plus(u[0], w[0]), plus(u[1], w[1])
 
 
 @inline_kernel
-def cross_motion(u, w):
+def cross_motion(u: Spatial, w: Spatial) -> Spatial:
     """The motion u x w."""
     return cross(u[0], w[0]), plus(cross(u[0], w[1]), cross(u[1], w[0]))
 
 
 @inline_kernel
-def cross_force(u, f):
+def cross_force(u: Spatial, f: Spatial) -> Spatial:
     """The force u x* f."""
     return plus(cross(u[0], f[0]), cross(u[1], f[1])), cross(u[0], f[1])
 
 
 @inline_kernel
-def power(u, f):
+def power(u: Spatial, f: Spatial) -> float:
     """The scalar u . f of a motion and a force."""
     return dot(u[0], f[0]) + dot(u[1], f[1])
 
 
 @inline_kernel
-def at_point(u, point):
+def at_point(u: Spatial, point: Vector) -> Vector:
     """The linear part of motion u at a point: u_linear + u_angular x point."""
     return plus(u[1], cross(u[0], point))
 
 
 @inline_kernel
-def columns_times(columns, u):
+def columns_times(columns: Array, u: Spatial) -> Spatial:
     """The product of a 6x6 matrix, stored as its columns (36,), and spatial vector u."""
     a, b, c, d, e, f = u[0][0], u[0][1], u[0][2], u[1][0], u[1][1], u[1][2]
     return (
@@ -69,7 +70,7 @@ def columns_times(columns, u):
 
 
 @inline_kernel
-def rows_times(columns, u):
+def rows_times(columns: Array, u: Spatial) -> Spatial:
     """The product of the transpose of a 6x6 matrix, stored as its columns (36,), and spatial vector u."""
     return (
         (

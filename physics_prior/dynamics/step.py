@@ -25,6 +25,7 @@ from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kinematics import flow, pose, weigh
 from physics_prior.dynamics.manifold import displace, displacement_derivative, rate, rate_derivative
 from physics_prior.dynamics.memory import sections, tangent_sections
+from physics_prior.dynamics.types import Array, Records
 from physics_prior.effects.none import differentiate_forces, forces  # scene: effects
 
 CONSTRAINED = False  # scene: constraints
@@ -32,7 +33,7 @@ RUNGE_KUTTA = True  # scene: integrator
 
 
 @kernel
-def evaluate(memory, q, v, extra, step, vdot):
+def evaluate(memory: Array, q: Array, v: Array, extra: Array, step: float, vdot: Array) -> int:
     """Fill vdot (nv,) at q and v under the effects and extra generalized forces (nv,); return the constraints' rank.
 
     step > 0 takes gyroscopic torques at the middle of such a step.
@@ -58,7 +59,7 @@ def evaluate(memory, q, v, extra, step, vdot):
 
 
 @kernel
-def advance(memory, q, v, extra, h, count):
+def advance(memory: Array, q: Array, v: Array, extra: Array, h: float, count: int) -> int:
     """Move q (nq,) and v (nv,) in place by count steps of h seconds; return the constraints' rank, -1 if not finite.
 
     Semi-implicit Euler, or the classical Runge-Kutta method of order four in the coordinates theta of q0 [+] theta (Munthe-Kaas
@@ -108,7 +109,7 @@ def advance(memory, q, v, extra, h, count):
 
 
 @kernel
-def differentiate(memory, tangent, q, v, step):
+def differentiate(memory: Array, tangent: Array, q: Array, v: Array, step: float) -> None:
     """Fill the tangent's derivative (2 nv, nv): row j is that of vdot by the j-th tangent of q, row nv + j by v_j.
 
     Needs ``evaluate`` at the same state.
@@ -149,7 +150,7 @@ def differentiate(memory, tangent, q, v, step):
 
 
 @kernel
-def differentiate_acceleration(memory, tangent, q, v, extra):
+def differentiate_acceleration(memory: Array, tangent: Array, q: Array, v: Array, extra: Array) -> int:
     """Fill the tangent's derivative of ``evaluate`` at q, v and extra, gyroscopic torques explicit; return the rank."""
     rank = evaluate(memory, q, v, extra, 0.0, sections(memory)[6][3])
     differentiate(memory, tangent, q, v, 0.0)
@@ -157,7 +158,7 @@ def differentiate_acceleration(memory, tangent, q, v, extra):
 
 
 @kernel
-def _combine(derivative, q_x, v_x, out):
+def _combine(derivative: Array, q_x: Array, v_x: Array, out: Array) -> None:
     """Fill out (nv, k): the derivative of vdot from those of q and v, (nv, k) each."""
     nv = v_x.shape[0]
     clear(out)
@@ -169,7 +170,7 @@ def _combine(derivative, q_x, v_x, out):
 
 
 @kernel
-def project_columns(memory, A, A_q, columns):
+def project_columns(memory: Array, A: Array, A_q: Array, columns: Array) -> None:
     """Put the columns (2 nv, k) of errors of q and v onto the constraints' tangent space, in the mass metric.
 
     A dq = 0 and A dv + d(A v)/dq dq = 0: the covariance then has no mass in forbidden directions. Needs ``refresh``.
@@ -193,7 +194,7 @@ def project_columns(memory, A, A_q, columns):
 
 
 @kernel
-def tangent_rows(memory, tangent, q, v, A, A_q):
+def tangent_rows(memory: Array, tangent: Array, q: Array, v: Array, A: Array, A_q: Array) -> None:
     """Fill A (m, nv) and A_q (m, nv), the constraint Jacobian and the derivative of A v by q, at q and v."""
     links, work, pairs, rows, known, _, _, parameters = sections(memory)
     m, nv = rows.shape[0], v.shape[0]
@@ -208,7 +209,9 @@ def tangent_rows(memory, tangent, q, v, A, A_q):
 
 
 @kernel
-def linearise(memory, tangent, q, v, extra, h, force_noise, F, G):
+def linearise(
+    memory: Array, tangent: Array, q: Array, v: Array, extra: Array, h: float, force_noise: Array, F: Array, G: Array
+) -> int:
     """Make one step as ``advance`` does, fill its derivatives and return the rank.
 
     F (2 nv, 2 nv): the new error by the old. G (2 nv, 2 nv): a factor of what white generalized forces of density
@@ -290,7 +293,7 @@ def linearise(memory, tangent, q, v, extra, h, force_noise, F, G):
 
 
 @kernel
-def _force_noise(links, work, force_noise, h, G, spare):
+def _force_noise(links: Records, work: Records, force_noise: Array, h: float, G: Array, spare: Array) -> None:
     """Fill G (2 nv, 2 nv) from white generalized forces over h seconds; needs factors."""
     nv = force_noise.shape[0]
     clear(G)

@@ -6,20 +6,23 @@ import numpy as np
 from pydantic import Field
 
 from physics_prior.dynamics.kernel import kernel
+from physics_prior.dynamics.types import Array, Records
 from physics_prior.effects.effect import CompiledForce, Effect
 from physics_prior.errors import ModelError
 from physics_prior.model import JointKind, Tree
 
 
 @kernel
-def apply_joint_damping(parameters, links, work, q, v, tau):
+def apply_joint_damping(parameters: Array, links: Records, work: Records, q: Array, v: Array, tau: Array) -> None:
     """Add tau_k = -d_k v_k; parameters (nv,) are the coefficients d."""
     for k in range(v.shape[0]):
         tau[k] -= parameters[k] * v[k]
 
 
 @kernel
-def differentiate_joint_damping(parameters, links, work, q, v, tau_q, tau_v):
+def differentiate_joint_damping(
+    parameters: Array, links: Records, work: Records, q: Array, v: Array, tau_q: Array, tau_v: Array
+) -> None:
     """Add d tau_k / d v_k = -d_k."""
     for k in range(v.shape[0]):
         tau_v[k, k] -= parameters[k]

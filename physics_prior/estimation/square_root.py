@@ -9,10 +9,11 @@ import math
 import numpy as np
 
 from physics_prior.dynamics.kernel import kernel
+from physics_prior.dynamics.types import Array
 
 
 @kernel
-def triangularise(W):
+def triangularise(W: Array) -> None:
     """Make W (n, N >= n) lower triangular in place by Householder reflections of its rows; W W^T stays what it was."""
     n, N = W.shape
     for i in range(n):
@@ -42,7 +43,7 @@ def triangularise(W):
 
 
 @kernel
-def predict_factor(F, S, G, W):
+def predict_factor(F: Array, S: Array, G: Array, W: Array) -> None:
     """Replace S (n, n) by a lower factor of F S S^T F^T + G G^T. G (n, g); W (n, n + g) is scratch."""
     n, g = S.shape[0], G.shape[1]
     for i in range(n):
@@ -62,7 +63,7 @@ def predict_factor(F, S, G, W):
 
 
 @kernel
-def innovate(S, H, noise, W, whitened, y):
+def innovate(S: Array, H: Array, noise: Array, W: Array, whitened: Array, y: Array) -> float:
     """Triangularise [[noise, H S], [0, S]] in W (m + n, m + n) and whiten the innovation y (m,); return its squared length.
 
     H (m, k <= n) acts on the first k errors; noise (m, m) is a lower factor. Afterwards W = [[factor of the innovation's

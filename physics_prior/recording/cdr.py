@@ -205,8 +205,7 @@ class _Run:
         self._codes = [code for _, code in scalars]
         self._values = slice(stop - len(scalars), stop)
         self._structs = [
-            [struct.Struct(order + _padded(self._codes, phase)) for phase in range(8)]
-            for order in BYTE_ORDERS
+            [struct.Struct(order + _padded(self._codes, phase)) for phase in range(8)] for order in BYTE_ORDERS
         ]
 
     def read(self, body: memoryview, position: int, order: int, values: list[Any]) -> int:

@@ -298,7 +298,7 @@ def _processor() -> str:
 
 def _world_point(simulator: Simulator, part: str, point: np.ndarray) -> np.ndarray:
     position, R = simulator.pose(part)
-    return position + R @ point
+    return np.asarray(position + R @ point)
 
 
 def _require(name: str, theirs: np.ndarray, ours: np.ndarray) -> None:

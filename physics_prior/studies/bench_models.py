@@ -124,7 +124,7 @@ class PinocchioModel:
     def acceleration(self, q: np.ndarray, v: np.ndarray, vdot: np.ndarray) -> np.ndarray:
         """(nv,) vdot of ours in Pinocchio's convention: d/dt (X v) = X vdot + W X v."""
         turn = self.velocity_map(q)
-        return turn @ vdot + self.transport(v) @ turn @ v
+        return np.asarray(turn @ vdot + self.transport(v) @ turn @ v)
 
     def acceleration_derivatives(
         self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, vdot: np.ndarray, by_q: np.ndarray, by_v: np.ndarray

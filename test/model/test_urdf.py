@@ -72,8 +72,7 @@ def mass_matrix(tree: Tree, q: np.ndarray, step: float = 1e-6) -> np.ndarray:
             for a, b in pairs
         ]
         angular = [
-            here[i][1].T @ Rotation.from_matrix(a[i][1] @ b[i][1].T).as_rotvec() / (2.0 * step)
-            for a, b in pairs
+            here[i][1].T @ Rotation.from_matrix(a[i][1] @ b[i][1].T).as_rotvec() / (2.0 * step) for a, b in pairs
         ]
         M += body.mass * np.array(linear) @ np.array(linear).T
         M += np.array(angular) @ body.inertia @ np.array(angular).T

@@ -34,6 +34,7 @@ from physics_prior.recording.wire import MESSAGE_CLASSES, STRING
 
 ROSBAGS = get_typestore(Stores.ROS2_JAZZY)
 
+
 @given(draw=st.data())
 def test_round_trip(any_message, draw):
     message = draw.draw(any_message)

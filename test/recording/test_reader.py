@@ -142,7 +142,9 @@ def test_other_encodings_are_refused_only_when_asked_for(tmp_path):
 def test_a_topic_of_two_types_is_refused(tmp_path):
     write_mcap(tmp_path / "bag_0.mcap", [1])
     write_mcap(tmp_path / "bag_1.mcap", [1], schema="std_msgs/msg/Empty")
-    with pytest.raises(RecordingError, match=r"holds topic /text both as std_msgs/msg/String .* and as std_msgs/msg/Em"):
+    with pytest.raises(
+        RecordingError, match=r"holds topic /text both as std_msgs/msg/String .* and as std_msgs/msg/Em"
+    ):
         open_bag(tmp_path)
 
 
@@ -188,7 +190,9 @@ def test_a_description_that_does_not_fit_is_refused(tmp_path, change, says):
         open_bag(tmp_path / "bag")
 
 
-@pytest.mark.parametrize("text", ["", "[1]", "a: 1", "{", "\0", "rosbag2_bagfile_information: 3", "!!python/name:os.system"])
+@pytest.mark.parametrize(
+    "text", ["", "[1]", "a: 1", "{", "\0", "rosbag2_bagfile_information: 3", "!!python/name:os.system"]
+)
 def test_a_description_that_is_none_is_refused(tmp_path, text):
     (tmp_path / "metadata.yaml").write_text(text)
     with pytest.raises(RecordingError, match="does not describe a bag"):

@@ -62,12 +62,8 @@ class Estimator:
         gated = sum(node.posterior.used is False for node in self.history.nodes)
         return Counts(self._read, self._dropped.used + used, self._dropped.gated + gated, self._late, self._rejected)
 
-    def finish(self) -> None:
-        """Settle all that the history still holds: no more measurements will come. The estimate is gone then."""
-        self.reset()
-
     def reset(self) -> None:
-        """Forget all measurements; the next ones start it cold."""
+        """Settle and forget all measurements; the next ones start it cold."""
         for node in self.history.nodes:
             self._settle(node)
         self.history = History(self.filter, self.history.length)

@@ -14,6 +14,7 @@ from physics_prior.estimation.measurement import (
     PointsMeasurement,
     PoseMeasurement,
 )
+from physics_prior.model import JointKind
 from physics_prior.scene import JointSource, MeasurementSource, OrientationSource, PointsSource, PoseSource
 
 
@@ -98,6 +99,8 @@ def innovation(source: MeasurementSource, measurement: Measurement, simulator: S
     for row, name in enumerate(measurement.names):
         link = simulator.tree.link(source.joints[name])
         y[row] = measurement.positions[row] - q[link.q][0]
+        if link.joint.kind is JointKind.REVOLUTE:  # an encoder may wrap where it likes
+            y[row] = (y[row] + np.pi) % (2.0 * np.pi) - np.pi
         H[row, link.v] = 1.0
     return Innovation(y, H, source.noise * np.eye(len(y)))
 

@@ -160,7 +160,7 @@ class _Replay:
             for log_time, posterior in self._posteriors(progress):
                 if not self.smoothed:
                     self._emit(posterior, log_time)
-            self.estimator.finish()
+            self.estimator.reset()
             if self.smoothed:
                 for posterior in smooth_nodes(self.estimator.filter, self.settled, self.period):
                     self._emit(posterior, posterior.stamp)

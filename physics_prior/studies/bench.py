@@ -4,8 +4,6 @@ With --peers, Pinocchio and MuJoCo (their PyPI wheels) take turns with ours in o
 we are faster. Before anything is timed, the engines' results are compared.
 """
 
-import argparse
-import json
 import os
 import platform
 import sys
@@ -20,8 +18,6 @@ from typing import Any
 
 import numba
 import numpy as np
-from rich.console import Console
-from rich.progress import Progress
 from rich.table import Table
 
 from physics_prior.dynamics.compose import SEMI_IMPLICIT_EULER
@@ -206,24 +202,6 @@ def run_bench(peers: bool, progress: Callable[[int, int], None] = lambda done, t
         us = _medians(contestants, restarts, progress)
     ratios = {name: us[peer] / us[own] for name, (own, peer) in RATIOS.items() if peer in us}
     return {"ratios": ratios, "us": us, "machine": _machine(peers)}
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of ``physics-prior bench``."""
-    parser.add_argument("--peers", action="store_true", help="time Pinocchio and MuJoCo too (extra 'bench')")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run ``physics-prior bench``; return the exit code."""
-    console = Console(stderr=True)
-    with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
-        task = bar.add_task("timing", total=None)
-        figures = run_bench(args.peers, lambda done, total: bar.update(task, completed=done, total=total))
-    Console().print(table(figures))
-    if args.json is not None:
-        args.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
-    return 0
 
 
 def table(figures: dict[str, Any]) -> Table:

@@ -42,7 +42,7 @@ def test_errors_are_as_large_as_said(shipped, filter_of, moments_of, name, runs,
         for moment in moments:
             for measurement in moment.measurements:
                 estimator.add(measurement)
-        estimator.finish()
+        estimator.reset()
         for node in nodes:
             if node.measurement.stamp - EPOCH >= SETTLED:
                 nis += node.posterior.nis

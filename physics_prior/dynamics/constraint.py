@@ -35,7 +35,8 @@ REGULARISATION = 1e-10  # of the mean diagonal: small steps are not safer near a
 DEPENDENT = 1e3  # a pivot within this factor of the regularisation belongs to a row that adds nothing
 REFINEMENTS = 3
 EXACT = 1e-15  # of the right side: refinement stops there
-STEP_TOLERANCE, TOLERANCE = 1e-11, 1e-13  # m: projection after a step, and on demand, stops there
+POSITION_TOLERANCE = 1e-15  # m: projection stops there
+ROUNDING = 1e-13  # m: below it, projection stops where it gains nothing
 POSITION_ITERATIONS = 12
 
 
@@ -337,13 +338,13 @@ def project(
     q: Array,
     v: Array,
     spare: Array,
-    tolerance: float,
 ) -> float:
     """Put q (nq,) and v (nv,) back onto the constraints in the mass metric; return the position error left, m.
 
-    q moves by -M^-1 A^T (A M^-1 A^T)^-1 e until e is within tolerance, v by the same map of A v (design eq. 11). The factors of a
+    q moves by -M^-1 A^T (A M^-1 A^T)^-1 e until e is gone, v by the same map of A v (design eq. 11). The factors of a
     configuration nearby, which the workspace must hold, serve q as long as they make e ten times smaller (simplified
-    Newton's method); the velocity has those of the final q, and the next step finds them there. spare (2, nv).
+    Newton's method); the velocity has those of the final q, and the next step finds them there. e goes down to rounding:
+    where a mechanism folds, an error e lets it stray by the root of e. spare (2, nv).
     """
     nv, m, w = v.shape[0], rows.shape[0], width(rows)
     right = rows[:, 2 * w + 2 * m]
@@ -352,11 +353,11 @@ def project(
     place(work, pairs)
     error = position_error(pairs, right)
     for _ in range(POSITION_ITERATIONS):
-        if error <= tolerance:
+        if error <= POSITION_TOLERANCE:
             break
         slow = error > 0.1 * before
         if slow:
-            if exact and error > 0.5 * before:
+            if error <= ROUNDING or (exact and error > 0.5 * before):
                 break
             complete(links, work, pairs, rows, known, q)
         before, exact = error, slow

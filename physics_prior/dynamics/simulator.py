@@ -130,7 +130,7 @@ class Simulator:
         own = self.memory
         system = (own.links, own.work, own.pairs, own.rows, own.known, q)
         constraint.refresh(*system)
-        return float(constraint.project(*system, v, own.spare, constraint.TOLERANCE))
+        return float(constraint.project(*system, v, own.spare))
 
     def displaced(self, q: np.ndarray, delta: np.ndarray) -> np.ndarray:
         """(nq,) q moved by a tangent vector (nv,), as Tree.integrate does, compiled."""

@@ -10,7 +10,6 @@ import math
 from physics_prior.dynamics.arrays import accumulate, clear, copy
 from physics_prior.dynamics.articulated_body import accelerate, factorize
 from physics_prior.dynamics.constraint import (
-    STEP_TOLERANCE,
     constrain_acceleration,
     multiply,
     project,
@@ -99,7 +98,7 @@ def advance(memory: Array, q: Array, v: Array, extra: Array, h: float, count: in
                 theta[k] = h * v[k]
             displace(links, q, theta, q)
         if CONSTRAINED:
-            project(links, work, pairs, rows, known, q, v, spare, STEP_TOLERANCE)
+            project(links, work, pairs, rows, known, q, v, spare)
     total = 0.0
     for k in range(nv):
         total += abs(v[k])
@@ -285,7 +284,7 @@ def linearise(
     copy(q_x, F[:nv])
     copy(v_sum_x, F[nv:])
     if CONSTRAINED:
-        project(links, work, pairs, rows, known, q, v, spare, STEP_TOLERANCE)
+        project(links, work, pairs, rows, known, q, v, spare)
         tangent_rows(memory, tangent, q, v, A, A_q)
         project_columns(memory, A, A_q, F)
         project_columns(memory, A, A_q, G)

@@ -125,7 +125,7 @@ def test_effects_equal_the_formulation(seed, effects_of, random_tree, random_sta
 def test_energy_is_kept_by_constraints(random_tree, random_state):
     """Constraint forces do no work: the power of all that acts is that of gravity and tau."""
     rng = np.random.default_rng(8)
-    tree, _, simulator, q, v = held_tree(rng, random_tree, random_state, attachment)
+    _, _, simulator, q, v = held_tree(rng, random_tree, random_state, attachment)
     simulator.move(q, v)
     before = simulator.energy()
     simulator.advance(q, v, 1e-4, 2000)

@@ -17,7 +17,7 @@ ROOMS = [
     ("errors", "resources", "rotations"),
     ("inertia",),
     ("model",),
-    ("dynamics.kernel", "dynamics.algebra"),
+    ("dynamics.kernel", "dynamics.types", "dynamics.algebra"),
     ("effects",),
     ("dynamics",),
     ("scene",),

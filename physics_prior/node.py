@@ -310,11 +310,11 @@ def main(arguments: list[str] | None = None) -> int:
     node: PhysicsPriorNode | None = None
     try:
         rclpy.init(args=arguments)
+        executor = SingleThreadedExecutor()  # whole before the node is ready: half of one cannot be interrupted cleanly
         node = PhysicsPriorNode()
+        executor.add_node(node)
         if node.get_parameter(AUTOSTART).value and not node.start() and rclpy.ok():
             return 2
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass

@@ -3,8 +3,8 @@
 Unit forces of all rows run once through the articulated-body factors: Y = their generalized forces, Z = D^-1 Y, so that
 A M^-1 A^T = Y Z^T without A or M ever being formed. Redundant rows leave it singular; the solve is proximal (Carpentier
 2021): regularised by 1e-10 of the mean diagonal and refined, so that motion is exact and multipliers are those of least
-norm. ``rows`` is one array (m, 2 w + 2 m + 3): Y | Z | A M^-1 A^T | its Cholesky factor | right side | answer | change,
-where w counts the degrees of freedom that the rows move. A row d . (b - a), d fixed on link a, sees b move against link
+norm. ``rows`` is one array (m + 3, 2 w + 2 m): Y | Z | A M^-1 A^T | its Cholesky factor, and below them right side, answer
+and change; w counts the degrees of freedom that the rows move. A row d . (b - a), d fixed on link a, sees b move against link
 a's own point at b: so both forces act at b. The two of a rod act at its ends.
 """
 
@@ -27,17 +27,15 @@ from physics_prior.dynamics.algebra import (
 from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.articulated_body import factorize, pull, push
 from physics_prior.dynamics.kernel import inline_kernel, kernel
-from physics_prior.dynamics.kinematics import flow, pose, weigh
-from physics_prior.dynamics.manifold import displace
+from physics_prior.dynamics.kinematics import pose, weigh
 from physics_prior.dynamics.types import Array, Record, Records, Vector
 
 REGULARISATION = 1e-10  # of the mean diagonal: small steps are not safer near a singular configuration (design eq. 11)
 DEPENDENT = 1e3  # a pivot within this factor of the regularisation belongs to a row that adds nothing
 REFINEMENTS = 3
 EXACT = 1e-15  # of the right side: refinement stops there
-POSITION_TOLERANCE = 1e-15  # m: projection stops there
-ROUNDING = 1e-13  # m: below it, projection stops where it gains nothing
-POSITION_ITERATIONS = 12
+POSITION_TOLERANCE = 1e-11  # m: what projection leaves
+ROUNDING = 1e-15  # m: no projection goes below
 
 
 @inline_kernel
@@ -155,18 +153,26 @@ def acceleration_error(work: Records, pairs: Records, gravity: Array, out: Array
 
 
 @inline_kernel
+def row_count(rows: Array) -> int:
+    """The number m of rows."""
+    return int(rows.shape[0] - 3)
+
+
+@inline_kernel
 def width(rows: Array) -> int:
     """The number of degrees of freedom that the rows move."""
-    return int((rows.shape[1] - 2 * rows.shape[0] - 3) // 2)
+    return int(rows.shape[1] // 2 - row_count(rows))
 
 
 @kernel
-def assemble(links: Records, work: Records, pairs: Records, rows: Array) -> int:
-    """Fill Y, Z, A M^-1 A^T and its regularised Cholesky factor; return the rank. Needs factors and ``place``.
+def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: Array) -> None:
+    """Fill Y, Z, A M^-1 A^T and its regularised Cholesky factor, and the last two of known. Needs factors and ``place``.
 
+    These are the rows' rank and the position error, m, that projection may leave: so little that no motion strays further
+    than POSITION_TOLERANCE, however nearly singular the rows are (a mechanism that folds).
     The factor is L D L^T with unit L, here also above the diagonal, in which stands D inverted.
     """
-    m, w = rows.shape[0], width(rows)
+    m, w = row_count(rows), width(rows)
     for p in range(pairs.shape[0]):
         pair = pairs[p]
         first, last = pair.first, pair.first + pair.rows
@@ -178,15 +184,16 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array) -> int:
         push(links, work, pair.link_a, get3(pair.hold), minus9(d), pair.rows, y, z)
     trace = 0.0
     for r in range(m):
+        one = rows[r, :w]
         for s in range(r + 1):
-            total = 0.0
+            other, total = rows[s, w : 2 * w], 0.0
             for k in range(w):
-                total += rows[r, k] * rows[s, w + k]
+                total += one[k] * other[k]
             rows[r, 2 * w + s] = total
             rows[s, 2 * w + r] = total
         trace += rows[r, 2 * w + r]
     epsilon = REGULARISATION * trace / m
-    rank = 0
+    rank, least = 0, math.inf
     S, L = rows[:, 2 * w : 2 * w + m], rows[:, 2 * w + m : 2 * w + 2 * m]
     for r in range(m):
         for s in range(r, m):
@@ -196,7 +203,9 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array) -> int:
         pivot = L[r, r]
         if pivot > DEPENDENT * epsilon:
             rank += 1
-        inverse = 1.0 / max(pivot, 1e-3 * epsilon)
+        pivot = max(pivot, 1e-3 * epsilon)
+        least = min(least, pivot)
+        inverse = 1.0 / pivot
         L[r, r] = inverse
         for s in range(r + 1, m):
             factor = L[r, s] * inverse
@@ -205,40 +214,40 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array) -> int:
             L[s, r] = factor
         for s in range(r + 1, m):
             L[r, s] = L[s, r]
-    return rank
+    known[-2] = rank
+    known[-1] = max(POSITION_TOLERANCE * math.sqrt(least * REGULARISATION / epsilon), ROUNDING)
 
 
 @kernel
 def multiply(rows: Array) -> None:
     """Solve A M^-1 A^T answer = right side, proximally; fills the answer, spoils the right side."""
-    m, w = rows.shape[0], width(rows)
-    left, answer, change = 2 * w + 2 * m, 2 * w + 2 * m + 1, 2 * w + 2 * m + 2
-    S, L = 2 * w, 2 * w + m
+    m, w = row_count(rows), width(rows)
+    left, answer, change = rows[m], rows[m + 1], rows[m + 2]
     size = 0.0
     for r in range(m):
-        rows[r, answer] = 0.0
-        size = max(size, abs(rows[r, left]))
+        answer[r] = 0.0
+        size = max(size, abs(left[r]))
     for _ in range(REFINEMENTS):
         for r in range(m):
-            rows[r, change] = rows[r, left]
+            change[r] = left[r]
         for s in range(m):
-            known = rows[s, change]
+            known, column = change[s], rows[s, 2 * w + m :]
             for r in range(s + 1, m):
-                rows[r, change] -= rows[s, L + r] * known
+                change[r] -= column[r] * known
         for s in range(m):
-            rows[s, change] *= rows[s, L + s]
+            change[s] *= rows[s, 2 * w + m + s]
         for s in range(m - 1, -1, -1):
-            known = rows[s, change]
-            rows[s, answer] += known
+            known, column = change[s], rows[s, 2 * w + m :]
+            answer[s] += known
             for r in range(s):
-                rows[r, change] -= rows[s, L + r] * known
+                change[r] -= column[r] * known
         for s in range(m):
-            known = rows[s, change]
+            known, column = change[s], rows[s, 2 * w :]
             for r in range(m):
-                rows[r, left] -= rows[s, S + r] * known
+                left[r] -= column[r] * known
         rest = 0.0
         for r in range(m):
-            rest = max(rest, abs(rows[r, left]))
+            rest = max(rest, abs(left[r]))
         if rest <= EXACT * size:
             break
 
@@ -246,42 +255,39 @@ def multiply(rows: Array) -> None:
 @kernel
 def respond(links: Records, work: Records, rows: Array, z: Array, vdot: Array) -> None:
     """Fill vdot (nv,) = M^-1 A^T answer, and the links' increments of acceleration. z (nv,) is scratch."""
-    m, w = rows.shape[0], width(rows)
-    answer = rows[:, 2 * w + 2 * m + 1]
+    m, w = row_count(rows), width(rows)
     clear(z)
     for r in range(m):
-        known = answer[r]
+        known, own = rows[m + 1, r], rows[r, w : 2 * w]
         for k in range(w):
-            z[k] += rows[r, w + k] * known
+            z[k] += own[k] * known
     pull(links, work, z, vdot)
 
 
 @kernel
 def refresh(links: Records, work: Records, pairs: Records, rows: Array, known: Array, q: Array) -> int:
     """Have the factors and rows of q (nq,) in the workspace, if they are not there yet; return the rank."""
-    nq = q.shape[0]
     if work[0].factored:
         same = True
-        for k in range(nq):
+        for k in range(q.shape[0]):
             same = same and known[k] == q[k]
         if same:
-            return int(known[nq])
+            return int(known[-2])
     pose(links, work, q)
     place(work, pairs)
-    return complete(links, work, pairs, rows, known, q)
+    complete(links, work, pairs, rows, known, q)
+    return int(known[-2])
 
 
 @kernel
-def complete(links: Records, work: Records, pairs: Records, rows: Array, known: Array, q: Array) -> int:
-    """Fill the factors and rows of q (nq,), poses and pairs being there; return the rank."""
+def complete(links: Records, work: Records, pairs: Records, rows: Array, known: Array, q: Array) -> None:
+    """Fill the factors and rows of q (nq,), poses and pairs being there."""
     weigh(links, work)
     factorize(links, work)
-    rank = assemble(links, work, pairs, rows)
+    assemble(links, work, pairs, rows, known)
     for k in range(q.shape[0]):
         known[k] = q[k]
-    known[q.shape[0]] = rank
     work[0].factored = 1
-    return rank
 
 
 @kernel
@@ -293,8 +299,8 @@ def constrain_acceleration(
     Needs ``refresh`` and ``accelerate``. The system is design eq. 4 with f_c = +A^T lambda, so that pair.force acts ON link
     b. spare (2, nv) is scratch.
     """
-    nv, m, w = vdot.shape[0], rows.shape[0], width(rows)
-    acceleration_error(work, pairs, gravity, rows[:, 2 * w + 2 * m])
+    nv, m = vdot.shape[0], row_count(rows)
+    acceleration_error(work, pairs, gravity, rows[m])
     multiply(rows)
     respond(links, work, rows, spare[0], spare[1])
     for k in range(nv):
@@ -307,7 +313,7 @@ def constrain_acceleration(
         pair = pairs[p]
         force = ZERO
         for row in range(pair.rows):
-            force = plus(force, scale(rows[pair.first + row, 2 * w + 2 * m + 1], direction(pair, row)))
+            force = plus(force, scale(rows[m + 1, pair.first + row], direction(pair, row)))
         put3(pair.force, force)
 
 
@@ -326,52 +332,3 @@ def load_links(work: Records, pairs: Records) -> None:
             back = scale(-1.0, force)
             add3(on.force, back)
             add3(on.moment, cross(minus(get3(pair.hold), get3(on.origin)), back))
-
-
-@kernel
-def project(
-    links: Records,
-    work: Records,
-    pairs: Records,
-    rows: Array,
-    known: Array,
-    q: Array,
-    v: Array,
-    spare: Array,
-) -> float:
-    """Put q (nq,) and v (nv,) back onto the constraints in the mass metric; return the position error left, m.
-
-    q moves by -M^-1 A^T (A M^-1 A^T)^-1 e until e is gone, v by the same map of A v (design eq. 11). The factors of a
-    configuration nearby, which the workspace must hold, serve q as long as they make e ten times smaller (simplified
-    Newton's method); the velocity has those of the final q, and the next step finds them there. e goes down to rounding:
-    where a mechanism folds, an error e lets it stray by the root of e. spare (2, nv).
-    """
-    nv, m, w = v.shape[0], rows.shape[0], width(rows)
-    right = rows[:, 2 * w + 2 * m]
-    before, exact = math.inf, False
-    pose(links, work, q)
-    place(work, pairs)
-    error = position_error(pairs, right)
-    for _ in range(POSITION_ITERATIONS):
-        if error <= POSITION_TOLERANCE:
-            break
-        slow = error > 0.1 * before
-        if slow:
-            if error <= ROUNDING or (exact and error > 0.5 * before):
-                break
-            complete(links, work, pairs, rows, known, q)
-        before, exact = error, slow
-        multiply(rows)
-        respond(links, work, rows, spare[0], spare[1])
-        displace(links, q, spare[1], q)
-        pose(links, work, q)
-        place(work, pairs)
-        error = position_error(pairs, right)
-    complete(links, work, pairs, rows, known, q)
-    flow(links, work, v)
-    velocity_error(work, pairs, right)
-    multiply(rows)
-    respond(links, work, rows, spare[0], spare[1])
-    for k in range(nv):
-        v[k] += spare[1, k]
-    return error

@@ -30,8 +30,9 @@ class Memory:
     Attributes:
         array: what compiled steps take.
         links, work, pairs: (N,) LINK, (N,) WORK and (P,) PAIR records.
-        rows: (m, 2 w + 2 m + 3) constraint rows over the w degrees of freedom that they move (constraint.py).
-        known: (nq + 1,) the configuration whose factors and rows stand in the memory, and the rows' rank there.
+        rows: (m + 3, 2 w + 2 m) constraint rows over the w degrees of freedom that they move (constraint.py).
+        known: (nq + 2,) the configuration whose factors and rows stand in the memory, their rank, and the position error, m,
+            that projection may leave there.
         parameters: the numbers of the effects.
     """
 
@@ -43,8 +44,8 @@ class Memory:
             len(links) * LINK_SIZE,
             len(links) * WORK_SIZE,
             len(pairs) * PAIR_SIZE,
-            m * (2 * width + 2 * m + 3),
-            nq + 1,
+            (m + 3) * (2 * width + 2 * m),
+            nq + 2,
             nq,
             SPARE * nv,
             len(parameters),
@@ -54,7 +55,7 @@ class Memory:
         self.array[:6] = len(links), len(pairs), m, nq, nv, sizes[3]
         own = [self.array[a:b] for a, b in pairwise(ends)]
         self.links, self.work, self.pairs = own[0].view(LINK), own[1].view(WORK), own[2].view(PAIR)
-        self.rows = own[3].reshape(m, 2 * width + 2 * m + 3)
+        self.rows = own[3].reshape(m + 3, 2 * width + 2 * m)
         self.known, self.parameters = own[4], own[7]
         self.spare = own[6].reshape(SPARE, nv)
         self.links[:], self.pairs[:], self.parameters[:] = links, pairs, parameters
@@ -83,15 +84,15 @@ def sections(memory: Array) -> Any:
     b = a + n * WORK_SIZE
     c = b + p * PAIR_SIZE
     d = c + int(memory[5])
-    e = d + nq + 1
+    e = d + nq + 2
     f = e + nq
     g = f + SPARE * nv
     return (
         carray(address(memory, HEAD), n, LINK),
         carray(address(memory, a), n, WORK),
         carray(address(memory, b), p, PAIR),
-        carray(address(memory, c), (m, (d - c) // max(m, 1)), FLOAT),
-        carray(address(memory, d), nq + 1, FLOAT),
+        carray(address(memory, c), (m + 3, (d - c) // (m + 3)), FLOAT),
+        carray(address(memory, d), nq + 2, FLOAT),
         carray(address(memory, e), nq, FLOAT),
         carray(address(memory, f), (SPARE, nv), FLOAT),
         carray(address(memory, g), memory.shape[0] - g, FLOAT),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from physics_prior import rotations
-from physics_prior.dynamics import constraint, kinematics, manifold, newton_euler
+from physics_prior.dynamics import constraint, kinematics, manifold, newton_euler, projection
 from physics_prior.dynamics.compose import GRAVITY, INTEGRATORS, RUNGE_KUTTA, pack_parameters, step_module
 from physics_prior.dynamics.memory import Memory, tangent_memory
 from physics_prior.dynamics.records import link_records, moved_freedoms, pair_records
@@ -130,7 +130,7 @@ class Simulator:
         own = self.memory
         system = (own.links, own.work, own.pairs, own.rows, own.known, q)
         constraint.refresh(*system)
-        return float(constraint.project(*system, v, own.spare))
+        return float(projection.project(*system, v, own.spare, constraint.ROUNDING))
 
     def displaced(self, q: np.ndarray, delta: np.ndarray) -> np.ndarray:
         """(nq,) q moved by a tangent vector (nv,), as Tree.integrate does, compiled."""

@@ -10,12 +10,12 @@ import math
 from physics_prior.dynamics.arrays import accumulate, clear, copy
 from physics_prior.dynamics.articulated_body import accelerate, factorize
 from physics_prior.dynamics.constraint import (
+    POSITION_TOLERANCE,
     constrain_acceleration,
     multiply,
-    project,
     refresh,
     respond,
-    width,
+    row_count,
 )
 from physics_prior.dynamics.constraint_derivatives import differentiate_rows
 from physics_prior.dynamics.derivatives import apply_inverse_mass, inverse_dynamics_derivatives, sweep
@@ -24,6 +24,7 @@ from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kinematics import flow, pose, weigh
 from physics_prior.dynamics.manifold import displace, displacement_derivative, rate, rate_derivative
 from physics_prior.dynamics.memory import sections, tangent_sections
+from physics_prior.dynamics.projection import project
 from physics_prior.dynamics.types import Array, Records
 from physics_prior.effects.none import differentiate_forces, forces  # scene: effects
 
@@ -98,7 +99,7 @@ def advance(memory: Array, q: Array, v: Array, extra: Array, h: float, count: in
                 theta[k] = h * v[k]
             displace(links, q, theta, q)
         if CONSTRAINED:
-            project(links, work, pairs, rows, known, q, v, spare)
+            project(links, work, pairs, rows, known, q, v, spare, POSITION_TOLERANCE)
     total = 0.0
     for k in range(nv):
         total += abs(v[k])
@@ -114,7 +115,7 @@ def differentiate(memory: Array, tangent: Array, q: Array, v: Array, step: float
     Needs ``evaluate`` at the same state.
     """
     links, work, pairs, rows, _, _, spare, parameters = sections(memory)
-    m, nv = rows.shape[0], v.shape[0]
+    m, nv = row_count(rows), v.shape[0]
     derivative, matrices, _, freedoms, composites, gaps = tangent_sections(tangent, links.shape[0], m, nv)
     gravity = parameters[:3]
     tau_q, tau_v = matrices[0:nv], matrices[nv : 2 * nv]
@@ -135,7 +136,7 @@ def differentiate(memory: Array, tangent: Array, q: Array, v: Array, step: float
             derivative[nv + j, i] = tau_v[i, j]
     apply_inverse_mass(links, work, derivative, spare)
     if CONSTRAINED:
-        right = rows[:, 2 * width(rows) + 2 * m]
+        right = rows[m]
         for j in range(2 * nv):
             for r in range(m):
                 total = rows_q[r, j] if j < nv else rows_v[r, j - nv]
@@ -176,7 +177,7 @@ def project_columns(memory: Array, A: Array, A_q: Array, columns: Array) -> None
     """
     links, work, _, rows, _, _, spare, _ = sections(memory)
     nv, m = A.shape[1], A.shape[0]
-    right = rows[:, 2 * width(rows) + 2 * m]
+    right = rows[m]
     for c in range(columns.shape[1]):
         for part in range(2):
             for r in range(m):
@@ -196,7 +197,7 @@ def project_columns(memory: Array, A: Array, A_q: Array, columns: Array) -> None
 def tangent_rows(memory: Array, tangent: Array, q: Array, v: Array, A: Array, A_q: Array) -> None:
     """Fill A (m, nv) and A_q (m, nv), the constraint Jacobian and the derivative of A v by q, at q and v."""
     links, work, pairs, rows, known, _, _, parameters = sections(memory)
-    m, nv = rows.shape[0], v.shape[0]
+    m, nv = row_count(rows), v.shape[0]
     _, matrices, _, freedoms, composites, gaps = tangent_sections(tangent, links.shape[0], m, nv)
     refresh(links, work, pairs, rows, known, q)
     flow(links, work, v)
@@ -218,7 +219,7 @@ def linearise(
     double integrator's exact second moments.
     """
     links, work, pairs, rows, known, start, spare, _ = sections(memory)
-    m, nv = rows.shape[0], v.shape[0]
+    m, nv = row_count(rows), v.shape[0]
     derivative, matrices, stages, _, _, _ = tangent_sections(tangent, links.shape[0], m, nv)
     vdot, theta, middle = spare[3], spare[4], spare[5]
     theta_rate, theta_sum, v_sum = spare[6], spare[7], spare[8]
@@ -284,7 +285,7 @@ def linearise(
     copy(q_x, F[:nv])
     copy(v_sum_x, F[nv:])
     if CONSTRAINED:
-        project(links, work, pairs, rows, known, q, v, spare)
+        project(links, work, pairs, rows, known, q, v, spare, POSITION_TOLERANCE)
         tangent_rows(memory, tangent, q, v, A, A_q)
         project_columns(memory, A, A_q, F)
         project_columns(memory, A, A_q, G)

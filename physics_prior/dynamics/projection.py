@@ -1,0 +1,68 @@
+"""Projection onto the constraints in the mass metric, of positions and velocities (design eq. 11)."""
+
+import math
+
+from physics_prior.dynamics.constraint import (
+    complete,
+    multiply,
+    place,
+    position_error,
+    respond,
+    row_count,
+    velocity_error,
+)
+from physics_prior.dynamics.kernel import kernel
+from physics_prior.dynamics.kinematics import flow, pose
+from physics_prior.dynamics.manifold import displace
+from physics_prior.dynamics.types import Array, Records
+
+ITERATIONS = 12
+STALL = 1e-13  # m: below it, projection stops where it gains little
+
+
+@kernel
+def project(
+    links: Records,
+    work: Records,
+    pairs: Records,
+    rows: Array,
+    known: Array,
+    q: Array,
+    v: Array,
+    spare: Array,
+    tolerance: float,
+) -> float:
+    """Put q (nq,) and v (nv,) back onto the constraints in the mass metric; return the position error left, m.
+
+    q moves by -M^-1 A^T (A M^-1 A^T)^-1 e until e is within tolerance, v by the same map of A v (design eq. 11). The factors of a
+    configuration nearby, which the workspace must hold, serve q as long as they make e ten times smaller (simplified
+    Newton's method); the velocity has those of the final q, and the next step finds them there. spare (2, nv).
+    """
+    nv, right = v.shape[0], rows[row_count(rows)]
+    before, exact = math.inf, False
+    pose(links, work, q)
+    place(work, pairs)
+    error = position_error(pairs, right)
+    for _ in range(ITERATIONS):
+        if error <= min(known[-1], tolerance):
+            break
+        slow = error > 0.1 * before
+        if slow:
+            if error <= STALL or (exact and error > 0.5 * before):
+                break
+            complete(links, work, pairs, rows, known, q)
+        before, exact = error, slow
+        multiply(rows)
+        respond(links, work, rows, spare[0], spare[1])
+        displace(links, q, spare[1], q)
+        pose(links, work, q)
+        place(work, pairs)
+        error = position_error(pairs, right)
+    complete(links, work, pairs, rows, known, q)
+    flow(links, work, v)
+    velocity_error(work, pairs, right)
+    multiply(rows)
+    respond(links, work, rows, spare[0], spare[1])
+    for k in range(nv):
+        v[k] += spare[1, k]
+    return error

@@ -46,6 +46,7 @@ def step_source(effects: Sequence[Effect], constrained: bool, integrator: str) -
     calls: list[str] = []
     slopes: list[str] = []
     imports = ["from physics_prior.dynamics.compose import section"]
+    names: dict[str, str] = {}
     compiled = [effect.compiled for effect in effects if effect.compiled is not None]
     for index, force in enumerate(compiled):
         parts: tuple[tuple[Any, str, list[str]], ...] = (
@@ -53,12 +54,15 @@ def step_source(effects: Sequence[Effect], constrained: bool, integrator: str) -
             (force.differentiate.py_func, "links, work, q, v, tau_q, tau_v", slopes),
         )
         for function, arguments, lines in parts:
-            lines.append(f"    {function.__name__}(section(parameters, {index}), {arguments})")
             # a user's effect stands outside the folders that key the cache: its own digest makes an edit miss
             digest = hashlib.sha256(Path(function.__code__.co_filename).read_bytes()).hexdigest()[:16]
-            line = f"from {function.__module__} import {function.__name__}  # {digest}"
-            if line not in imports:
-                imports.append(line)
+            source_of = f"from {function.__module__} import {function.__name__}"
+            if source_of not in names:
+                taken = sum(each.endswith(f" import {function.__name__}") for each in names)
+                names[source_of] = f"{function.__name__}_{taken}" if taken else function.__name__
+                renamed = f" as {names[source_of]}" if taken else ""
+                imports.append(f"{source_of}{renamed}  # {digest}")
+            lines.append(f"    {names[source_of]}(section(parameters, {index}), {arguments})")
     composed = "\n".join(imports)
     if calls:
         composed += (

@@ -112,13 +112,14 @@ def test_double_pendulum_reference(double_pendulum, reference):
         count = round((end - start) / 1e-3)
         simulator.advance(q, v, (end - start) / count, count)
         worst = max(worst, abs(q[0] - first), abs(q[0] + q[1] - second))
-    assert worst < 1e-8  # rad; measured figure in the closing comment of the run
+    assert worst < 1e-8  # rad; measured 3e-10
 
 
 def test_four_bar_reference(reference):
-    """RK4 at 0.5 ms over the first 5 s: three rods of 1 m and 1 kg, the verticals upright and pushed at 1 m/s.
+    """RK4 at 0.5 ms over 10 s: three rods of 1 m and 1 kg, the verticals upright and pushed at 1 m/s.
 
-    The analytic solution climbs back to upright, where errors grow e-fold in a quarter second.
+    Twice a turn all rods lie in one line: the rows lose rank and the mechanism could fold. What projection leaves there
+    strays by its root, so that 1e-11 m left would cost 2e-4 m.
     """
     table = reference("A02_four_bar_N1_20s.csv")
     body = rod(1.0, 1.0).transformed(np.eye(3), np.array([0.0, 0.0, 0.5]))
@@ -136,14 +137,14 @@ def test_four_bar_reference(reference):
     simulator.project(q, v)
     worst, times = 0.0, table["t"]
     for start, end, x, y in zip(times[:-1], times[1:], table["B0x"][1:], table["B0y"][1:], strict=True):
-        if end > 5.0:
+        if end > 10.0:
             break
         count = round((end - start) / 5e-4)
         simulator.advance(q, v, (end - start) / count, count)
         simulator.move(q, v)
         position, R = simulator.pose("left")
         worst = max(worst, float(np.max(np.abs(position + R @ up - [x, 0.0, y]))))
-    assert worst < 1e-7  # m
+    assert worst < 1e-9  # m; measured 5e-11
 
 
 def test_heavy_top_reference(heavy_top, reference):
@@ -157,7 +158,7 @@ def test_heavy_top_reference(heavy_top, reference):
         simulator.advance(q, v, (row["t"] - start) / 10, 10)
         expected = np.array([row["qw"], row["qx"], row["qy"], row["qz"]])
         worst = max(worst, float(np.min([np.max(np.abs(q - expected)), np.max(np.abs(q + expected))])))
-    assert worst < 1e-6
+    assert worst < 1e-6  # measured 2e-9
 
 
 def residuals(name, count, calls):
@@ -186,11 +187,13 @@ def residuals(name, count, calls):
 )
 @pytest.mark.parametrize("name", ["ball_on_rod", "four_bar"])
 def test_constraints_hold(name, count, calls):
-    """No residual grows: the second half's is the first half's. Measured: see docs/kernels.md."""
+    """No residual grows: the second half's is the first half's.
+
+    Measured over a million steps: ball_on_rod 9.9e-12 m, 3.9e-16 m/s, norms 2.2e-16; four_bar 1.0e-15 m, 1.1e-15 m/s.
+    """
     found = residuals(name, count, calls)
     assert np.max(found[:, 0]) <= 1e-9
     assert np.max(found[:, 1]) <= 1e-9
     assert np.max(found[:, 2]) <= 1e-12
     first, second = np.max(found[: calls // 2, 0]), np.max(found[calls // 2 :, 0])
     assert second <= 10.0 * max(first, 1e-13)
-    print(name, count, np.max(found, axis=0), first, second)

@@ -1,0 +1,143 @@
+"""Effects by themselves: what they refuse, contribute and explain, and that derivatives are those of their force."""
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from physics_prior import rotations
+from physics_prior.dynamics.simulator import Simulator
+from physics_prior.effects import REGISTRY
+from physics_prior.effects.attachment import Attachment, Hinge, Rod, Weld
+from physics_prior.effects.gravity import Gravity
+from physics_prior.effects.joint_damping import JointDamping
+from physics_prior.errors import ModelError
+from physics_prior.inertia import box
+from physics_prior.model import Joint, JointKind, Part, Tree
+
+
+@pytest.fixture(scope="module")
+def tree():
+    body = box(2.0, (0.1, 0.2, 0.3))
+    return Tree(
+        [Part("base", body), Part("arm", body), Part("tip", body), Part("cap", body)],
+        [
+            Joint("flight", JointKind.FREE, "world", "base"),
+            Joint(
+                "elbow", JointKind.REVOLUTE, "base", "arm", np.array([0.3, 0.0, 0.0]), axis=np.array([0.0, 1.0, 0.0])
+            ),
+            Joint("wrist", JointKind.SPHERICAL, "arm", "tip", np.array([0.3, 0.0, 0.0])),
+            Joint("glue", JointKind.FIXED, "tip", "cap", np.array([0.1, 0.0, 0.0])),
+        ],
+    )
+
+
+def test_registry_names_every_effect_by_its_kind():
+    assert all(effect.kind == kind for kind, effect in REGISTRY.items())
+    assert {"gravity", "joint_damping", "attachment", "rod", "hinge", "weld"} <= set(REGISTRY)
+
+
+@pytest.mark.parametrize(
+    ("effect", "rows"),
+    [
+        (Gravity(), 0),
+        (JointDamping(coefficients={"elbow": 1.0}), 0),
+        (Attachment(part="tip"), 3),
+        (Rod(part="tip", length=0.5), 1),
+        (Hinge(part="tip", axis=(0, 0, 2), to_axis=(0, 0, 1)), 5),
+        (Weld(part="tip", to="base"), 6),
+    ],
+)
+def test_effects_explain_themselves_and_count_their_rows(tree, effect, rows):
+    effect.check(tree)
+    assert len(effect.explain(tree)) > 10
+    assert effect.label == effect.kind
+    pairs = effect.point_pairs(tree)
+    assert sum(1 if pair.length is not None else len(pair.directions) for pair in pairs) == rows
+    assert Simulator(tree, [effect]).rows == rows
+
+
+@pytest.mark.parametrize(
+    ("effect", "message"),
+    [
+        (Attachment(part="foot"), "part 'foot' is unknown: known parts are .*'tip'"),
+        (Attachment(part="tip", to="hand"), "part 'hand' is unknown"),
+        (Weld(part="tip", to="cap"), "'tip' and 'cap' are one rigid body"),
+        (JointDamping(coefficients={"flight": 1.0}), "joint 'flight' is free"),
+        (JointDamping(coefficients={"glue": 1.0}), "joint 'glue' is unknown or fixed"),
+    ],
+)
+def test_effects_that_do_not_fit_are_refused(tree, effect, message):
+    with pytest.raises(ModelError, match=message):
+        Simulator(tree, [effect])
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Rod(part="tip", length=0.0),
+        lambda: Rod(part="tip", length=1.0, lenght=2.0),
+        lambda: JointDamping(coefficients={"elbow": -1.0}),
+        lambda: JointDamping(coefficients={}),
+        lambda: Attachment(),
+    ],
+)
+def test_parameters_out_of_range_are_refused(make):
+    with pytest.raises(ValidationError):
+        make()
+
+
+def test_gravities_add_up(tree):
+    fields = [Gravity(), Gravity(name="tide", acceleration=(0.1, 0.0, 0.2))]
+    q, v = tree.neutral(), np.zeros(tree.nv)
+    assert np.allclose(Simulator(tree, fields).acceleration(q, v)[:3], [0.1, 0.0, 0.2 - 9.80665], atol=1e-13)
+
+
+def test_damping_resists_each_named_joint_only(tree):
+    rng = np.random.default_rng(0)
+    simulator = Simulator(tree, [JointDamping(coefficients={"elbow": 2.0, "wrist": 0.5})])
+    v = rng.normal(size=tree.nv)
+    simulator.acceleration(tree.neutral(), v)
+    assert np.allclose(simulator.effort, -np.array([0, 0, 0, 0, 0, 0, 2.0, 0.5, 0.5, 0.5]) * v, atol=0.0)
+
+
+def test_damping_takes_energy_and_no_momentum(tree):
+    rng = np.random.default_rng(1)
+    simulator = Simulator(tree, [JointDamping(coefficients={"elbow": 2.0, "wrist": 0.5})])
+    q, v = tree.neutral(), rng.normal(size=tree.nv)
+
+    def measured():
+        simulator.move(q, v)
+        return simulator.energy(), simulator.mass_matrix(q)[:3] @ v
+
+    energy, momentum = measured()
+    for _ in range(5):
+        simulator.advance(q, v, 1e-3, 100)
+        less, same = measured()
+        assert less < energy
+        assert np.allclose(same, momentum, atol=1e-10)  # measured 2e-12
+        energy = less
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        Hinge(part="tip", point=(0.1, 0, 0), at=(0.7, 0, 0), axis=(0, 1, 1), to_axis=(0, 1, 1)),
+        Weld(part="tip", at=(0.6, 0, 0)),
+    ],
+)
+def test_hinge_and_weld_leave_what_they_should(tree, effect):
+    """After a second of a push: a hinge has turned about its axis only, a weld not at all."""
+    simulator = Simulator(tree, [Gravity(acceleration=(0.0, 0.0, 0.0)), effect])
+    q, v = tree.neutral(), np.random.default_rng(2).normal(size=tree.nv)
+    simulator.project(q, v)
+    simulator.advance(q, v, 1e-3, 1000)
+    simulator.move(q, v)
+    position, R = simulator.pose("tip")
+    if isinstance(effect, Weld):
+        assert np.allclose(position, effect.at, atol=1e-11)
+        assert np.allclose(R, np.eye(3), atol=1e-10)
+    else:
+        axis = np.array(effect.axis) / np.sqrt(2.0)
+        assert np.allclose(position + R @ effect.point, effect.at, atol=1e-11)
+        assert np.allclose(R @ axis, axis, atol=1e-10)
+        assert rotations.log(rotations.quaternion_from_matrix(R)) @ axis != pytest.approx(0.0, abs=1e-3)

@@ -1,26 +1,16 @@
-"""The node in this process, over real DDS: parameters, life cycle, what comes in, what goes out, and when."""
+"""The node over real DDS: what comes in, what goes out, and when."""
 
-import random
-import time
 from itertools import islice
 
 import numpy as np
 import pytest
-import yaml
 
 pytest.importorskip("rclpy", reason="needs rclpy: pip install .[ros]")
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
-from lifecycle_msgs.msg import State, Transition
-from lifecycle_msgs.srv import ChangeState, GetState
 from nav_msgs.msg import Odometry
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -29,121 +19,13 @@ from visualization_msgs.msg import MarkerArray
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.interface import Output, take_in
-from physics_prior.node import PhysicsPriorNode
 from physics_prior.recording.cdr import decode, encode
 from physics_prior.recording.messages import Header
 from physics_prior.recording.messages import PoseStamped as OurPose
 from physics_prior.recording.simulate import message_of, motion
-from physics_prior.resources import share_directory
-from physics_prior.ros_parameters import SETTINGS, ParameterError
 from physics_prior.scene import load_scene
 
-SCENE = "uw_double_pendulum"
 TOPICS = ("/link1/pose", "/link2/pose")
-DEADLINE = 30.0  # s, for what takes a hundredth of one
-PATIENCE = 1.0  # s, until a service is asked again
-QUIET = {"publish_rate": 0.0, "marker_rate": 0.0, "diagnostics_rate": 0.0}
-DEEP = QoSProfile(depth=5000)
-
-
-class Graph:
-    """The node and a peer, each a DDS participant of its own, both spun in this thread until something is so."""
-
-    def __init__(self):
-        domain = random.randint(1, 101)
-        self.contexts = [Context(), Context()]
-        for context in self.contexts:
-            rclpy.init(context=context, domain_id=domain)
-        self.executors = [SingleThreadedExecutor(context=context) for context in self.contexts]
-        self.peer = rclpy.create_node("peer", context=self.contexts[1])
-        self.executors[1].add_node(self.peer)
-        self.nodes = [self.peer]
-
-    def node(self, start=True, **parameters):
-        overrides = [Parameter(name, value=value) for name, value in ({"scene": SCENE} | QUIET | parameters).items()]
-        node = PhysicsPriorNode(context=self.contexts[0], parameter_overrides=overrides)
-        self.nodes.append(node)
-        self.executors[0].add_node(node)
-        assert not start or node.start()
-        return node
-
-    def until(self, condition, what):
-        end = time.monotonic() + DEADLINE
-        while not condition():
-            assert time.monotonic() < end, f"waited {DEADLINE:g} s for {what}"
-            for executor in self.executors:
-                executor.spin_once(timeout_sec=0.002)
-
-    def publisher(self, ros_type, topic, qos=DEEP):
-        publisher = self.peer.create_publisher(ros_type, topic, qos)
-        self.until(lambda: publisher.get_subscription_count() > 0, f"a subscription to {topic}")
-        return publisher
-
-    def collect(self, ros_type, topic, raw=False, qos=DEEP):
-        received = []
-        self.peer.create_subscription(ros_type, topic, received.append, qos, raw=raw)
-        self.until(lambda: self.nodes[-1].count_subscribers(topic) > 0, f"{topic} to be discovered")
-        self.until(lambda: self.peer.count_publishers(topic) > 0, f"a publisher of {topic}")
-        return received
-
-    def call(self, service_type, name, request):
-        """Ask until an answer comes: a client may be served before its reader is known, and the answer lost."""
-        client = self.peer.create_client(service_type, name)
-        self.until(client.service_is_ready, name)
-        asked = []
-
-        def answered():
-            if not asked or time.monotonic() - asked[-1][0] > PATIENCE:
-                asked.append((time.monotonic(), client.call_async(request)))
-            return any(future.done() for _, future in asked)
-
-        self.until(answered, f"the answer of {name}")
-        return next(future.result() for _, future in asked if future.done())
-
-    def close(self):
-        for executor in self.executors:
-            executor.shutdown()
-        for node in self.nodes:
-            node.destroy_node()
-        for context in self.contexts:
-            rclpy.try_shutdown(context=context)
-
-
-@pytest.fixture
-def graph(monkeypatch):
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    graph = Graph()
-    yield graph
-    graph.close()
-
-
-@pytest.fixture(scope="module")
-def scene():
-    return load_scene(SCENE)
-
-
-@pytest.fixture(scope="module")
-def measured(scene):
-    """Measurements of a simulated second and a half, in order."""
-    simulator = Simulator(scene.tree, scene.effects, scene.step.integrator)
-    return [each for moment in islice(motion(scene, simulator), 150) for each in moment.measurements]
-
-
-@pytest.fixture
-def send(graph, scene):
-    """Publish measurements, each time waiting until the node has taken it in."""
-    publishers = {}
-
-    def publish(node, measurements):
-        for topic in TOPICS:
-            if topic not in publishers:
-                publishers[topic] = graph.publisher(PoseStamped, topic)
-        for measurement in measurements:
-            read = node._estimator.counts.read
-            publishers[measurement.topic].publish(encode(message_of(measurement, scene.frame_id)))
-            graph.until(lambda read=read: node._estimator.counts.read > read, "a measurement to be read")
-
-    return publish
 
 
 def directly(scene, measurements):
@@ -332,25 +214,6 @@ def test_lost_measurements_are_counted(graph, measured, scene):
 # When -------------------------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def clock(graph):
-    """Set simulated time, s, and wait until the node has it."""
-
-    def set_time(node, seconds):
-        if not hasattr(graph, "clock"):
-            graph.clock = graph.publisher(Clock, "/clock")
-        message = Clock()
-        message.clock.sec, message.clock.nanosec = divmod(round(seconds * 1e9), 10**9)
-
-        def shown():
-            graph.clock.publish(message)  # again and again: the node listens to it with best effort
-            return node._now() == round(seconds * 1e9)
-
-        graph.until(shown, f"the clock to show {seconds:g} s")
-
-    return set_time
-
-
 def test_without_measurements_the_state_is_predicted_until_it_is_lost(graph, clock, scene, measured, send):
     node = graph.node(use_sim_time=True, publish_rate=10.0, diagnostics_rate=50.0)
     clock(node, 1000.0)
@@ -401,118 +264,3 @@ def test_reset_starts_the_estimate_anew(graph, measured, send):
     send(node, measured[20:40])
     assert node._estimator.ready
     assert node._estimator.counts.read == 40
-
-
-# Parameters -------------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "reason"),
-    [
-        ("scene", "no_such", "'no_such' is neither a file nor a shipped scene; shipped are ball_on_rod, .*"),
-        ("scene", 3, "give a text"),
-        ("publish_rate", -1.0, "out of range"),
-        ("publish_rate", 100, "such as 1.0"),
-        ("publish_rate", float("nan"), "out of range"),
-        ("prediction_horizon", 1.5, "out of range"),
-        ("prediction_horizon", float("inf"), "out of range"),
-        ("history_length", -0.1, "out of range"),
-        ("autostart", "yes", "true or false"),
-    ],
-)
-def test_the_node_does_not_start_with_a_wrong_parameter(graph, name, value, reason):
-    with pytest.raises(ParameterError, match=f"parameter '{name}'.*{reason}") as refusal:
-        graph.node(**{name: value})
-    assert "\n" not in str(refusal.value)
-
-
-def test_a_scene_must_be_given(graph):
-    node = graph.node(start=False, scene="")
-    assert not node.start()
-    assert node._estimator is None
-
-
-def test_all_of_a_set_of_parameters_or_none(graph):
-    node = graph.node()
-    bad = [Parameter("marker_rate", value=5.0), Parameter("prediction_horizon", value=-1.0)]
-    result = node.set_parameters_atomically(bad)
-    assert not result.successful
-    assert "prediction_horizon" in result.reason
-    assert node.get_parameter("marker_rate").value == 0.0
-    for name, value in (("scene", "pendulum"), ("frame_id", "map"), ("history_length", 2.0)):
-        result = node.set_parameters_atomically([Parameter("marker_rate", value=5.0), Parameter(name, value=value)])
-        assert result.reason == f"'{name}' is read when the node is configured: clean it up first"
-    assert node.get_parameter("marker_rate").value == 0.0
-    good = [Parameter("marker_rate", value=5.0), Parameter("prediction_horizon", value=0.1)]
-    assert node.set_parameters_atomically(good).successful
-    assert [timer.timer_period_ns for timer in node._rate_timers] == [200_000_000, 200_000_000]  # markers, publishers
-
-
-def test_every_parameter_is_described(graph):
-    node = graph.node(start=False)
-    for name in SETTINGS:
-        descriptor = node.describe_parameter(name)
-        assert descriptor.description
-        if isinstance(SETTINGS[name].default, float):
-            (limits,) = descriptor.floating_point_range
-            assert limits.from_value == 0.0
-            assert limits.to_value > 0.0
-    assert not node.set_parameters([Parameter("autostart", value=False)])[0].successful
-
-
-def test_the_shipped_parameters_are_the_nodes(graph):
-    shipped = yaml.safe_load((share_directory() / "config" / "node.yaml").read_text())["/**"]["ros__parameters"]
-    assert list(shipped) == list(SETTINGS)
-    graph.node(start=False, **shipped)
-
-
-# Life cycle -------------------------------------------------------------------------------------------------------------
-
-
-def test_a_manager_takes_it_through_its_states(graph, measured, send):
-    node = graph.node(start=False, autostart=False)
-
-    def state():
-        return graph.call(GetState, "/physics_prior/get_state", GetState.Request()).current_state.id
-
-    changes = graph.peer.create_client(ChangeState, "/physics_prior/change_state")
-
-    def change(transition, goal):
-        graph.until(changes.service_is_ready, "the service")
-        changes.call_async(ChangeState.Request(transition=Transition(id=transition)))
-        graph.until(lambda: state() == goal, f"state {goal}")
-
-    assert state() == State.PRIMARY_STATE_UNCONFIGURED
-    change(Transition.TRANSITION_CONFIGURE, State.PRIMARY_STATE_INACTIVE)
-    assert node._inputs == []  # announces, does not listen
-    assert node.count_publishers("joint_states") == 1
-    received = graph.collect(JointState, "joint_states")
-    change(Transition.TRANSITION_ACTIVATE, State.PRIMARY_STATE_ACTIVE)
-    send(node, measured[:20])
-    graph.until(lambda: received and stamp_of(received[-1]) == measured[19].stamp, "states")
-    change(Transition.TRANSITION_DEACTIVATE, State.PRIMARY_STATE_INACTIVE)
-    assert node._inputs == []
-    assert node._rate_timers == []
-    assert not node._estimator.ready  # what is known then is old when it goes on
-    change(Transition.TRANSITION_ACTIVATE, State.PRIMARY_STATE_ACTIVE)
-    send(node, measured[20:40])
-    graph.until(lambda: stamp_of(received[-1]) == measured[39].stamp, "states again")
-    change(Transition.TRANSITION_DEACTIVATE, State.PRIMARY_STATE_INACTIVE)
-    change(Transition.TRANSITION_CLEANUP, State.PRIMARY_STATE_UNCONFIGURED)
-    assert node.count_publishers("joint_states") == 0
-    refused = node.set_parameters([Parameter("scene", value="no_such")])[0]
-    assert "shipped are ball_on_rod" in refused.reason
-    assert node.set_parameters([Parameter("scene", value="free_body")])[0].successful
-    change(Transition.TRANSITION_CONFIGURE, State.PRIMARY_STATE_INACTIVE)
-    assert node.count_publishers("odometry") == 1
-    change(Transition.TRANSITION_INACTIVE_SHUTDOWN, State.PRIMARY_STATE_FINALIZED)
-
-
-def test_a_scene_that_went_bad_leaves_the_node_unconfigured(graph, tmp_path):
-    path = tmp_path / "own.yaml"
-    path.write_text((share_directory() / "config" / "scenes" / "pendulum.yaml").read_text())
-    node = graph.node(start=False, scene=str(path))
-    path.write_text("model: 3")
-    assert not node.start()
-    assert node._estimator is None
-    assert node.count_publishers("joint_states") == 0

@@ -28,7 +28,7 @@ from physics_prior.recording.simulate import simulate
 from physics_prior.ros_inputs import ros_class
 from physics_prior.scene import load_scene
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 SHARED = ROOT.parent / "shared" / "bags"
 SCENE = "uw_double_pendulum"
 DEADLINE = 120.0  # s, with a cold cache
@@ -162,7 +162,7 @@ def live(bag, seconds, step, expected):
     listener = Listener(TOPICS)
     quiet = ("publish_rate:=0.0", "marker_rate:=0.0", "diagnostics_rate:=100.0")
     parameters = [word for each in (f"scene:={SCENE}", *quiet) for word in ("-p", each)]
-    player = [sys.executable, str(ROOT / "test" / "play_bag.py"), str(bag), str(seconds), step, *SOURCES]
+    player = [sys.executable, str(Path(__file__).with_name("play_bag.py")), str(bag), str(seconds), step, *SOURCES]
     last = {topic: list(expected[topic].values())[-1] for topic in TOPICS}
 
     def complete():

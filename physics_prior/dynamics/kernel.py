@@ -12,8 +12,8 @@ import llvmlite
 import numba
 import numpy as np
 
-FASTMATH = {"nsz", "arcp", "contract", "reassoc", "afn"}
-"""Everything but nnan and ninf: a NaN stays visible."""
+FASTMATH = {"nsz"}
+"""No flag that lets rounding depend on where a kernel was inlined: the same recording gives the same bits. NaN stays visible."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

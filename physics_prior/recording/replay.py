@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from physics_prior.errors import MeasurementError, RecordingError
+from physics_prior.errors import RecordingError
 from physics_prior.estimation.estimate import Counts, Health, Level
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.estimation.filter import Posterior
@@ -22,10 +22,10 @@ from physics_prior.estimation.history import Node
 from physics_prior.estimation.readout import deviations, evaluate, measured_acceleration, unit
 from physics_prior.estimation.score import FROM_SECONDS, Reference, Score
 from physics_prior.estimation.smoother import smooth as smooth_nodes
-from physics_prior.interface import Output, measurement_of
+from physics_prior.interface import Output, take_in
 from physics_prior.recording.cdr import decode
 from physics_prior.recording.messages import JointState
-from physics_prior.recording.reader import BagReader, Record, open_bag
+from physics_prior.recording.reader import BagReader, open_bag
 from physics_prior.recording.writer import BagWriter
 from physics_prior.scene import Scene
 
@@ -187,7 +187,7 @@ class _Replay:
                         yield pending
                     coasting += period
                     yield pending[0] + coasting, self._carried(pending[1], coasting)
-            if self._take(record):
+            if take_in(self.estimator, self.sources[record.topic], record.message_type, record.data):
                 newest = self.estimator.history.nodes[-1].posterior
                 if pending is not None and pending[1].stamp != newest.stamp and coasting == 0:
                     yield pending
@@ -199,16 +199,6 @@ class _Replay:
 
     def _carried(self, posterior: Posterior, ahead: int) -> Posterior:
         return self.estimator.filter.predict(posterior, posterior.stamp + ahead)
-
-    def _take(self, record: Record) -> bool:
-        """Translate a record and add it; what cannot be translated is counted as rejected."""
-        try:
-            message = decode(record.message_type, record.data)
-            measurement = measurement_of(self.sources[record.topic], message, self.scene)
-        except (MeasurementError, RecordingError) as problem:
-            self.estimator.reject(str(problem))
-            return False
-        return self.estimator.add(measurement)
 
     def _emit(self, posterior: Posterior, log_time: int) -> None:
         """Note an estimate, score it and file it."""

@@ -26,3 +26,32 @@ def accumulate(s: float, source: Array, out: Array) -> None:
     a, b = source.reshape(-1), out.reshape(-1)
     for k in range(a.shape[0]):
         b[k] += s * a[k]
+
+
+@kernel
+def add_product(a: Array, b: Array, out: Array) -> None:
+    """Add the product of a (n, m) and b (m, k) to out (n, k); four rows of b a pass, so that out is seldom moved."""
+    m, k = b.shape
+    whole = m - m % 4
+    for i in range(a.shape[0]):
+        row = out[i]
+        for j in range(0, whole, 4):
+            p, q, r, s = a[i, j], a[i, j + 1], a[i, j + 2], a[i, j + 3]
+            x, y, z, w = b[j], b[j + 1], b[j + 2], b[j + 3]
+            for c in range(k):
+                row[c] += p * x[c] + q * y[c] + r * z[c] + s * w[c]
+        for j in range(whole, m):
+            p, x = a[i, j], b[j]
+            for c in range(k):
+                row[c] += p * x[c]
+
+
+@kernel
+def subtract_transposed_product(a: Array, b: Array, out: Array) -> None:
+    """Subtract the product of a^T, a (m, n), and b (m, k) from out (n, k)."""
+    for i in range(out.shape[0]):
+        row = out[i]
+        for j in range(a.shape[0]):
+            p, x = a[j, i], b[j]
+            for c in range(row.shape[0]):
+                row[c] -= p * x[c]

@@ -333,44 +333,6 @@ def push(
 
 
 @kernel
-def push_generalized(links: Records, work: Records, tau: Array, z: Array) -> None:
-    """Run generalized forces tau (nv,) inward through the factors: fill z (nv,) = D^-1 (what is left of them).
-
-    z has its entries in the order of the links' columns, those of ball joints in world axes.
-    """
-    for i in range(links.shape[0]):
-        put3(work[i].delta_alpha, ZERO)  # here: the moment that children pass on
-        put3(work[i].delta_acceleration, ZERO)
-    for i in range(links.shape[0] - 1, -1, -1):
-        link, here = links[i], work[i]
-        moment, force = get3(here.delta_alpha), get3(here.delta_acceleration)
-        n, k = link.v, link.column
-        if link.kind == REVOLUTE or link.kind == PRISMATIC:
-            share = here.D * (tau[n] + dot(get3(here.axis), moment if link.kind == REVOLUTE else force))
-            z[k] = share
-            moment = minus(moment, scale(share, get3(here.U_moment)))
-            force = minus(force, scale(share, get3(here.U_force)))
-        else:
-            offset = 3 if link.kind == FREE else 0
-            first = n + offset
-            torque = times(get9(here.rotation), (tau[first], tau[first + 1], tau[first + 2]))
-            turn = plus(torque, moment)
-            local = symmetric_times(get6(here.J_inverse), turn)
-            for c in range(3):
-                z[k + offset + c] = local[c]
-            force = minus(force, transposed_times(get9(here.K), turn))
-            moment = scale(-1.0, torque)
-            if link.kind == FREE:
-                rest = symmetric_times(get6(here.M_inverse), plus((tau[n], tau[n + 1], tau[n + 2]), force))
-                for c in range(3):
-                    z[k + c] = rest[c]
-        if link.parent >= 0:
-            up = work[link.parent]
-            put3(up.delta_alpha, plus(get3(up.delta_alpha), plus(moment, cross(get3(here.arm), force))))
-            put3(up.delta_acceleration, plus(get3(up.delta_acceleration), force))
-
-
-@kernel
 def pull(links: Records, work: Records, z: Array, vdot: Array) -> None:
     """Run z (nv,) outward through the factors: fill vdot (nv,) = M^-1 tau, and the links' increments of acceleration."""
     for i in range(links.shape[0]):

@@ -24,7 +24,7 @@ from physics_prior.dynamics.algebra import (
     scale,
     times,
 )
-from physics_prior.dynamics.arrays import clear
+from physics_prior.dynamics.arrays import accumulate, clear, copy
 from physics_prior.dynamics.articulated_body import factorize, pull, push
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import pose, weigh
@@ -262,6 +262,45 @@ def respond(links: Records, work: Records, rows: Array, z: Array, vdot: Array) -
         for k in range(w):
             z[k] += own[k] * known
     pull(links, work, z, vdot)
+
+
+@kernel
+def responses(links: Records, work: Records, rows: Array, z: Array, out: Array) -> None:
+    """Fill out (m, nv) with M^-1 A^T, transposed; needs ``refresh``. z (nv,) is scratch."""
+    m = row_count(rows)
+    for r in range(m):
+        for s in range(m):
+            rows[m + 1, s] = 1.0 if r == s else 0.0
+        respond(links, work, rows, z, out[r])
+
+
+@kernel
+def multiply_columns(rows: Array, left: Array, answer: Array, change: Array) -> None:
+    """Solve as ``multiply`` does, for right sides left (m, k), which it spoils, and answers (m, k)."""
+    m, w = row_count(rows), width(rows)
+    clear(answer)
+    for _ in range(REFINEMENTS):
+        copy(left, change)
+        for s in range(m):
+            for r in range(s + 1, m):
+                _subtract(rows[s, 2 * w + m + r], change[s], change[r])
+        for s in range(m):
+            for c in range(change.shape[1]):
+                change[s, c] *= rows[s, 2 * w + m + s]
+        for s in range(m - 1, -1, -1):
+            for r in range(s):
+                _subtract(rows[s, 2 * w + m + r], change[s], change[r])
+        accumulate(1.0, change, answer)
+        for s in range(m):
+            for r in range(m):
+                _subtract(rows[s, 2 * w + r], change[s], left[r])
+
+
+@inline_kernel
+def _subtract(s: float, source: Array, out: Array) -> None:
+    """Subtract s times a vector from one of the same length."""
+    for c in range(out.shape[0]):
+        out[c] -= s * source[c]
 
 
 @kernel

@@ -92,7 +92,7 @@ def _differentiate_side(
                 SxV = cross_motion(S, V)
                 V_q = add(SxV, psi_dot)
                 A_q = add(add(cross_motion(S, A), cross_motion(psi_dot, V)), get_spatial(record.psi_ddot))
-                A_v = add(add(get_spatial(record.S_dot), SxV), psi_dot)
+                A_v = add(get_spatial(record.rate), SxV)
                 moved, velocity_q = at_point(S, p), at_point(V_q, p)
                 by_q = plus(at_point(A_q, p), plus(cross(V_q[0], velocity), cross(omega, velocity_q)))
                 by_v = plus(at_point(A_v, p), plus(cross(S[0], velocity), cross(omega, moved)))

@@ -7,8 +7,6 @@ counts as a translation that carries a ball joint. Forward dynamics follow from 
 import numpy as np
 
 from physics_prior.dynamics.algebra import cross, get3, get6, minus, plus, scale, symmetric_times
-from physics_prior.dynamics.arrays import clear
-from physics_prior.dynamics.articulated_body import pull, push_generalized
 from physics_prior.dynamics.gyroscopic import middle_correction, turning_inertia
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import freedom, freedoms
@@ -29,9 +27,10 @@ from physics_prior.dynamics.types import Array, Records, Spatial, Symmetric, Vec
 FREEDOM = np.dtype(
     [
         ("S", "f8", 6),  # direction of motion
-        ("S_dot", "f8", 6),  # its rate
+        ("rate", "f8", 6),  # S_dot + psi_dot: what v does to the acceleration through it
         ("psi_dot", "f8", 6),  # V_parent x S
         ("psi_ddot", "f8", 6),  # A_parent x S + V_parent x psi_dot
+        ("parent", "i8"),  # the degree of freedom that carries this one, -1 at the world
     ],
     align=True,
 )
@@ -84,6 +83,11 @@ def sweep(
             V_up, A_up = get_spatial(composites[link.parent].V), get_spatial(composites[link.parent].A)
         for c in range(freedoms(link.kind)):
             record = freedom_records[link.v + c]
+            record.parent = link.v + c - 1
+            if c == 0:
+                record.parent = -1
+                if link.parent >= 0:
+                    record.parent = links[link.parent].v + freedoms(links[link.parent].kind) - 1
             turn, shift = freedom(link.kind, here, c)
             S = (turn, plus(shift, cross(d, turn)))
             S_dot = cross_motion(V, S)
@@ -94,7 +98,7 @@ def sweep(
                     V_up, A_up = (still, get3(here.velocity)), (still, get3(here.acceleration))
             psi_dot = cross_motion(V_up, S)
             put_spatial(record.S, S)
-            put_spatial(record.S_dot, S_dot)
+            put_spatial(record.rate, add(S_dot, psi_dot))
             put_spatial(record.psi_dot, psi_dot)
             put_spatial(record.psi_ddot, add(cross_motion(A_up, S), cross_motion(V_up, psi_dot)))
         inertia, mass, center = get6(here.inertia), link.mass, plus(d, get3(here.center))
@@ -132,11 +136,12 @@ def sweep(
 
 @kernel
 def inverse_dynamics_derivatives(
-    links: Records, freedom_records: Records, composites: Records, tau_q: Array, tau_v: Array
+    links: Records, freedom_records: Records, composites: Records, tau_q: Array, tau_v: Array, M: Array
 ) -> None:
-    """Fill the derivatives of inverse dynamics at fixed vdot, (nv, nv) each, after ``sweep``; no external forces."""
-    clear(tau_q)
-    clear(tau_v)
+    """Fill the derivatives of inverse dynamics at fixed vdot, (nv, nv) each, after ``sweep``; no external forces.
+
+    Entries between branches are zero and left alone. M (nv, nv) gets the mass matrix below its diagonal.
+    """
     for i in range(links.shape[0]):
         link, own = links[i], composites[i]
         f = get_spatial(own.f)
@@ -144,8 +149,8 @@ def inverse_dynamics_derivatives(
             k = link.v + c
             record = freedom_records[k]
             S, psi_dot = get_spatial(record.S), get_spatial(record.psi_dot)
-            psi_ddot, rate = get_spatial(record.psi_ddot), add(psi_dot, get_spatial(record.S_dot))
-            row_B, row_I = rows_times(own.B, S), columns_times(own.I, S)
+            psi_ddot, rate = get_spatial(record.psi_ddot), get_spatial(record.rate)
+            row_B, momentum = rows_times(own.B, S), columns_times(own.I, S)
             column_q = add(add(columns_times(own.B, psi_dot), columns_times(own.I, psi_ddot)), cross_force(S, f))
             column_v = add(columns_times(own.B, S), columns_times(own.I, rate))
             j = i
@@ -158,17 +163,10 @@ def inverse_dynamics_derivatives(
                     n = other.v + e
                     up = freedom_records[n]
                     S_up, psi_up = get_spatial(up.S), get_spatial(up.psi_dot)
-                    tau_q[k, n] = power(psi_up, row_B) + power(get_spatial(up.psi_ddot), row_I)
-                    tau_v[k, n] = power(S_up, row_B) + power(add(psi_up, get_spatial(up.S_dot)), row_I)
+                    tau_q[k, n] = power(psi_up, row_B) + power(get_spatial(up.psi_ddot), momentum)
+                    M[k, n] = power(S_up, momentum)
+                    tau_v[k, n] = power(S_up, row_B) + power(get_spatial(up.rate), momentum)
                     if j != i or (translation_carries_ball and c >= 3 and e < 3):
                         tau_q[n, k] = power(S_up, column_q)
                         tau_v[n, k] = power(S_up, column_v)
                 j = other.parent
-
-
-@kernel
-def apply_inverse_mass(links: Records, work: Records, columns: Array, spare: Array) -> None:
-    """Replace every row of columns (k, nv), a generalized force, by the acceleration M^-1 of it. spare (2, nv)."""
-    for r in range(columns.shape[0]):
-        push_generalized(links, work, columns[r], spare[0])
-        pull(links, work, spare[0], columns[r])

@@ -100,24 +100,47 @@ def sections(memory: Array) -> Any:
 
 
 def tangent_memory(n: int, m: int, nv: int) -> np.ndarray:
-    """What ``linearise`` needs beside the memory, for n links, m rows and nv degrees of freedom."""
-    matrices = (2 * nv + 2 * nv + 4 * m) * nv + 7 * nv * 2 * nv
+    """What derivatives need beside the memory, for n links, m rows and nv degrees of freedom."""
+    matrices = 2 * nv * nv + (nv + 4 * m) * nv + 7 * nv * 2 * nv + correction_size(m, nv, 2 * nv)
     return np.zeros(matrices + nv * FREEDOM_SIZE + n * COMPOSITE_SIZE + nv * GAP_SIZE)
 
 
 @inline_kernel
-def tangent_sections(tangent: Array, n: int, m: int, nv: int) -> Any:
-    """The sections: derivative (2 nv, nv), matrices (2 nv + 4 m, nv), stages (7, nv, 2 nv), freedoms, composites, gaps."""
-    a = 2 * nv * nv
-    b = a + (2 * nv + 4 * m) * nv
-    c = b + 14 * nv * nv
-    d = c + nv * FREEDOM_SIZE
-    e = d + n * COMPOSITE_SIZE
+def correction_size(m: int, nv: int, k: int) -> int:
+    """Numbers that a correction of k columns by constraints needs: M^-1 A^T, and right sides, answers, changes (m, k)."""
+    return m * nv + 3 * m * k
+
+
+@inline_kernel
+def correction_sections(scratch: Array, m: int, nv: int, k: int) -> Any:
+    """The sections of that: M^-1 A^T transposed (m, nv), right sides, answers and changes (m, k)."""
+    a = m * nv
     return (
-        carray(address(tangent, 0), (2 * nv, nv), FLOAT),
-        carray(address(tangent, a), (2 * nv + 4 * m, nv), FLOAT),
+        carray(address(scratch, 0), (m, nv), FLOAT),
+        carray(address(scratch, a), (m, k), FLOAT),
+        carray(address(scratch, a + m * k), (m, k), FLOAT),
+        carray(address(scratch, a + 2 * m * k), (m, k), FLOAT),
+    )
+
+
+@inline_kernel
+def tangent_sections(tangent: Array, n: int, m: int, nv: int) -> Any:
+    """The sections: derivative (nv, 2 nv), matrices (nv + 4 m, nv), stages (7, nv, 2 nv), scratch, records.
+
+    The records are those of freedoms, composites and gaps.
+    """
+    a = 2 * nv * nv
+    b = a + (nv + 4 * m) * nv
+    c = b + 14 * nv * nv
+    d = c + correction_size(m, nv, 2 * nv)
+    e = d + nv * FREEDOM_SIZE
+    f = e + n * COMPOSITE_SIZE
+    return (
+        carray(address(tangent, 0), (nv, 2 * nv), FLOAT),
+        carray(address(tangent, a), (nv + 4 * m, nv), FLOAT),
         carray(address(tangent, b), (7, nv, 2 * nv), FLOAT),
-        carray(address(tangent, c), nv, FREEDOM),
-        carray(address(tangent, d), n, COMPOSITE),
-        carray(address(tangent, e), nv, GAP),
+        carray(address(tangent, c), d - c, FLOAT),
+        carray(address(tangent, d), nv, FREEDOM),
+        carray(address(tangent, e), n, COMPOSITE),
+        carray(address(tangent, f), nv, GAP),
     )

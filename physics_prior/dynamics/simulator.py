@@ -8,7 +8,7 @@ import numpy as np
 from physics_prior import rotations
 from physics_prior.dynamics import constraint, kinematics, manifold, newton_euler, projection
 from physics_prior.dynamics.compose import GRAVITY, INTEGRATORS, RUNGE_KUTTA, pack_parameters, step_module
-from physics_prior.dynamics.memory import Memory, tangent_memory
+from physics_prior.dynamics.memory import Memory, correction_size, tangent_memory
 from physics_prior.dynamics.records import link_records, moved_freedoms, pair_records
 from physics_prior.effects.effect import Effect, PointPair
 from physics_prior.errors import ModelError, SimulationError
@@ -92,8 +92,8 @@ class Simulator:
         """Derivatives (nv, nv) of ``acceleration`` by the tangent of q and by v, at constant tau."""
         extra, nv = self._still if tau is None else tau, self.nv
         self.rank = self.step.differentiate_acceleration(self.memory.array, self.tangent_array(), q, v, extra)
-        by_state = self.tangent_array()[: 2 * nv * nv].reshape(2, nv, nv)
-        return by_state[0].T.copy(), by_state[1].T.copy()
+        by_state = self.tangent_array()[: 2 * nv * nv].reshape(nv, 2 * nv)
+        return by_state[:, :nv].copy(), by_state[:, nv:].copy()
 
     def advance(self, q: np.ndarray, v: np.ndarray, h: float, count: int = 1, tau: np.ndarray | None = None) -> None:
         """Move q and v in place by count steps of h seconds, under constant extra forces tau (nv,).
@@ -142,7 +142,8 @@ class Simulator:
         """Put q and v, and the columns of a factor (2 nv, k) of their errors, onto the constraints, in place."""
         if self.rows:
             self.project(q, v)
-            self.step.project_columns(self.memory.array, *self.tangent_rows(q, v), factor)
+            scratch = np.empty(correction_size(self.rows, self.nv, factor.shape[1]))
+            self.step.project_columns(self.memory.array, *self.tangent_rows(q, v), factor, scratch)
 
     def tangent_rows(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Constraint Jacobian A (rows, nv) and the derivative of A v by the tangent of q (rows, nv)."""

@@ -7,23 +7,24 @@ scene's step holds the effects that it names and nothing else. ``memory`` is tha
 
 import math
 
-from physics_prior.dynamics.arrays import accumulate, clear, copy
+from physics_prior.dynamics.arrays import accumulate, add_product, clear, copy, subtract_transposed_product
 from physics_prior.dynamics.articulated_body import accelerate, factorize
 from physics_prior.dynamics.constraint import (
     POSITION_TOLERANCE,
     constrain_acceleration,
-    multiply,
+    multiply_columns,
     refresh,
-    respond,
+    responses,
     row_count,
 )
 from physics_prior.dynamics.constraint_derivatives import differentiate_rows
-from physics_prior.dynamics.derivatives import apply_inverse_mass, inverse_dynamics_derivatives, sweep
+from physics_prior.dynamics.derivatives import inverse_dynamics_derivatives, sweep
 from physics_prior.dynamics.gyroscopic import take_at_middle
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kinematics import flow, pose, weigh
 from physics_prior.dynamics.manifold import displace, displacement_derivative, rate, rate_derivative
-from physics_prior.dynamics.memory import sections, tangent_sections
+from physics_prior.dynamics.mass_factor import factorize_mass, solve_mass
+from physics_prior.dynamics.memory import correction_sections, sections, tangent_sections
 from physics_prior.dynamics.projection import project
 from physics_prior.dynamics.types import Array, Records
 from physics_prior.effects.none import differentiate_forces, forces  # scene: effects
@@ -110,43 +111,39 @@ def advance(memory: Array, q: Array, v: Array, extra: Array, h: float, count: in
 
 @kernel
 def differentiate(memory: Array, tangent: Array, q: Array, v: Array, step: float) -> None:
-    """Fill the tangent's derivative (2 nv, nv): row j is that of vdot by the j-th tangent of q, row nv + j by v_j.
+    """Fill the tangent's derivative (nv, 2 nv): of vdot by the tangent of q, and beside it by v.
 
     Needs ``evaluate`` at the same state.
     """
     links, work, pairs, rows, _, _, spare, parameters = sections(memory)
     m, nv = row_count(rows), v.shape[0]
-    derivative, matrices, _, freedoms, composites, gaps = tangent_sections(tangent, links.shape[0], m, nv)
-    gravity = parameters[:3]
-    tau_q, tau_v = matrices[0:nv], matrices[nv : 2 * nv]
+    derivative, matrices, _, scratch, freedoms, composites, gaps = tangent_sections(tangent, links.shape[0], m, nv)
+    gravity, M, tau_q, tau_v = parameters[:3], matrices[0:nv], derivative[:, :nv], derivative[:, nv:]
+    clear(derivative)
     sweep(links, work, gravity, step, freedoms, composites)
-    inverse_dynamics_derivatives(links, freedoms, composites, tau_q, tau_v)
-    A, A_q = matrices[2 * nv : 2 * nv + m], matrices[2 * nv + m : 2 * nv + 2 * m]
-    rows_q, rows_v = matrices[2 * nv + 2 * m : 2 * nv + 3 * m], matrices[2 * nv + 3 * m : 2 * nv + 4 * m]
+    inverse_dynamics_derivatives(links, freedoms, composites, tau_q, tau_v, M)
+    A, A_q = matrices[nv : nv + m], matrices[nv + m : nv + 2 * m]
+    rows_q, rows_v = matrices[nv + 2 * m : nv + 3 * m], matrices[nv + 3 * m : nv + 4 * m]
     if CONSTRAINED:
         differentiate_rows(links, work, pairs, freedoms, composites, gravity, gaps, A, A_q, rows_q, rows_v, tau_q)
     for i in range(nv):
-        for j in range(nv):
-            tau_q[i, j] = -tau_q[i, j]
-            tau_v[i, j] = -tau_v[i, j]
-    differentiate_forces(parameters, links, work, q, v, tau_q, tau_v)
-    for i in range(nv):
-        for j in range(nv):
-            derivative[j, i] = tau_q[i, j]
-            derivative[nv + j, i] = tau_v[i, j]
-    apply_inverse_mass(links, work, derivative, spare)
-    if CONSTRAINED:
-        right = rows[m]
+        own = derivative[i]
         for j in range(2 * nv):
-            for r in range(m):
-                total = rows_q[r, j] if j < nv else rows_v[r, j - nv]
-                for k in range(nv):
-                    total += A[r, k] * derivative[j, k]
-                right[r] = -total
-            multiply(rows)
-            respond(links, work, rows, spare[0], spare[1])
-            for k in range(nv):
-                derivative[j, k] += spare[1, k]
+            own[j] = -own[j]
+    differentiate_forces(parameters, links, work, q, v, tau_q, tau_v)
+    factorize_mass(freedoms, M)
+    solve_mass(freedoms, M, derivative)
+    if CONSTRAINED:
+        response, right, answer, change = correction_sections(scratch, m, nv, 2 * nv)
+        responses(links, work, rows, spare[0], response)
+        clear(right)
+        add_product(A, derivative, right)
+        for r in range(m):
+            for j in range(nv):
+                right[r, j] += rows_q[r, j]
+                right[r, nv + j] += rows_v[r, j]
+        multiply_columns(rows, right, answer, change)
+        subtract_transposed_product(response, answer, derivative)
 
 
 @kernel
@@ -158,39 +155,26 @@ def differentiate_acceleration(memory: Array, tangent: Array, q: Array, v: Array
 
 
 @kernel
-def _combine(derivative: Array, q_x: Array, v_x: Array, out: Array) -> None:
-    """Fill out (nv, k): the derivative of vdot from those of q and v, (nv, k) each."""
-    nv = v_x.shape[0]
-    clear(out)
-    for j in range(nv):
-        for i in range(nv):
-            by_q, by_v = derivative[j, i], derivative[nv + j, i]
-            for c in range(out.shape[1]):
-                out[i, c] += by_q * q_x[j, c] + by_v * v_x[j, c]
-
-
-@kernel
-def project_columns(memory: Array, A: Array, A_q: Array, columns: Array) -> None:
+def project_columns(memory: Array, A: Array, A_q: Array, columns: Array, scratch: Array) -> None:
     """Put the columns (2 nv, k) of errors of q and v onto the constraints' tangent space, in the mass metric.
 
-    A dq = 0 and A dv + d(A v)/dq dq = 0: the covariance then has no mass in forbidden directions. Needs ``refresh``.
+    A dq = 0 and A dv + d(A v)/dq dq = 0: the covariance then has no mass in forbidden directions. Needs ``refresh``, and
+    scratch of ``correction_size``.
     """
     links, work, _, rows, _, _, spare, _ = sections(memory)
-    nv, m = A.shape[1], A.shape[0]
-    right = rows[m]
-    for c in range(columns.shape[1]):
-        for part in range(2):
-            for r in range(m):
-                total = 0.0
-                for k in range(nv):
-                    total += A[r, k] * columns[part * nv + k, c]
-                    if part == 1:
-                        total += A_q[r, k] * columns[k, c]
-                right[r] = -total
-            multiply(rows)
-            respond(links, work, rows, spare[0], spare[1])
-            for k in range(nv):
-                columns[part * nv + k, c] += spare[1, k]
+    m, nv = A.shape
+    by_q, by_v = columns[:nv], columns[nv:]
+    response, right, answer, change = correction_sections(scratch, m, nv, columns.shape[1])
+    responses(links, work, rows, spare[0], response)
+    clear(right)
+    add_product(A, by_q, right)
+    multiply_columns(rows, right, answer, change)
+    subtract_transposed_product(response, answer, by_q)
+    clear(right)
+    add_product(A, by_v, right)
+    add_product(A_q, by_q, right)
+    multiply_columns(rows, right, answer, change)
+    subtract_transposed_product(response, answer, by_v)
 
 
 @kernel
@@ -198,13 +182,13 @@ def tangent_rows(memory: Array, tangent: Array, q: Array, v: Array, A: Array, A_
     """Fill A (m, nv) and A_q (m, nv), the constraint Jacobian and the derivative of A v by q, at q and v."""
     links, work, pairs, rows, known, _, _, parameters = sections(memory)
     m, nv = row_count(rows), v.shape[0]
-    _, matrices, _, freedoms, composites, gaps = tangent_sections(tangent, links.shape[0], m, nv)
+    derivative, matrices, _, _, freedoms, composites, gaps = tangent_sections(tangent, links.shape[0], m, nv)
     refresh(links, work, pairs, rows, known, q)
     flow(links, work, v)
     sweep(links, work, parameters[:3], 0.0, freedoms, composites)
-    rows_q, rows_v = matrices[2 * nv + 2 * m : 2 * nv + 3 * m], matrices[2 * nv + 3 * m : 2 * nv + 4 * m]
+    rows_q, rows_v = matrices[nv + 2 * m : nv + 3 * m], matrices[nv + 3 * m : nv + 4 * m]
     differentiate_rows(
-        links, work, pairs, freedoms, composites, parameters[:3], gaps, A, A_q, rows_q, rows_v, matrices[0:nv]
+        links, work, pairs, freedoms, composites, parameters[:3], gaps, A, A_q, rows_q, rows_v, derivative[:, :nv]
     )
 
 
@@ -220,7 +204,7 @@ def linearise(
     """
     links, work, pairs, rows, known, start, spare, _ = sections(memory)
     m, nv = row_count(rows), v.shape[0]
-    derivative, matrices, stages, _, _, _ = tangent_sections(tangent, links.shape[0], m, nv)
+    derivative, matrices, stages, scratch, freedoms, _, _ = tangent_sections(tangent, links.shape[0], m, nv)
     vdot, theta, middle = spare[3], spare[4], spare[5]
     theta_rate, theta_sum, v_sum = spare[6], spare[7], spare[8]
     start_x, theta_x, v_x, q_x = stages[0], stages[1], stages[2], stages[3]
@@ -238,15 +222,16 @@ def linearise(
     copy(v, middle)
     copy(start_x, q_x)
     step = 0.0 if RUNGE_KUTTA else h
-    A, A_q = matrices[2 * nv : 2 * nv + m], matrices[2 * nv + m : 2 * nv + 2 * m]
+    by_q, by_v, M = derivative[:, :nv], derivative[:, nv:], matrices[0:nv]
+    A, A_q = matrices[nv : nv + m], matrices[nv + m : nv + 2 * m]
     rank = 0
     for stage in range(4 if RUNGE_KUTTA else 1):
         rank = evaluate(memory, q, middle, extra, step, vdot)
         differentiate(memory, tangent, q, middle, step)
         if stage == 0:
-            _force_noise(links, work, force_noise, h, G, spare)
+            _force_noise(freedoms, M, force_noise, h, stages[6], G)
             if CONSTRAINED:
-                project_columns(memory, A, A_q, G)
+                project_columns(memory, A, A_q, G, scratch)
         if RUNGE_KUTTA:
             rate(links, theta, middle, theta_rate)
             rate_derivative(links, theta, middle, theta_x, v_x, rate_x)
@@ -260,7 +245,9 @@ def linearise(
                 middle[k] = v[k] + ahead * vdot[k]
             clear(theta_x)
             accumulate(ahead, rate_x, theta_x)
-            _combine(derivative, q_x, v_x, rate_x)
+            clear(rate_x)
+            add_product(by_q, q_x, rate_x)
+            add_product(by_v, v_x, rate_x)
             accumulate(weight, rate_x, v_sum_x)
             clear(v_x)
             for k in range(nv):
@@ -270,8 +257,7 @@ def linearise(
                 displace(links, start, theta, q)
                 displacement_derivative(links, theta, start_x, theta_x, q_x)
         else:
-            _combine(derivative, q_x, v_x, rate_x)
-            accumulate(h, rate_x, v_sum_x)
+            accumulate(h, derivative, v_sum_x)
             for k in range(nv):
                 v_sum[k] = h * vdot[k]
                 theta_sum[k] = h * (v[k] + v_sum[k])
@@ -287,23 +273,23 @@ def linearise(
     if CONSTRAINED:
         project(links, work, pairs, rows, known, q, v, spare, POSITION_TOLERANCE)
         tangent_rows(memory, tangent, q, v, A, A_q)
-        project_columns(memory, A, A_q, F)
-        project_columns(memory, A, A_q, G)
+        project_columns(memory, A, A_q, F, scratch)
+        project_columns(memory, A, A_q, G, scratch)
     return rank
 
 
 @kernel
-def _force_noise(links: Records, work: Records, force_noise: Array, h: float, G: Array, spare: Array) -> None:
-    """Fill G (2 nv, 2 nv) from white generalized forces over h seconds; needs factors."""
+def _force_noise(freedoms: Records, M: Array, force_noise: Array, h: float, columns: Array, G: Array) -> None:
+    """Fill G (2 nv, 2 nv) from white generalized forces over h seconds; M is factored, columns (nv, 2 nv) is zero."""
     nv = force_noise.shape[0]
-    clear(G)
     near, far, late = h * math.sqrt(h / 3.0), 0.5 * math.sqrt(3.0 * h), 0.5 * math.sqrt(h)
-    for j in range(nv):
-        if force_noise[j] > 0.0:
-            clear(spare[2])
-            spare[2, j] = force_noise[j]
-            apply_inverse_mass(links, work, spare[2:3], spare)
-            for k in range(nv):
-                G[k, j] = near * spare[2, k]
-                G[nv + k, j] = far * spare[2, k]
-                G[nv + k, nv + j] = late * spare[2, k]
+    for k in range(nv):
+        columns[k, k] = force_noise[k]
+    solve_mass(freedoms, M, columns)
+    clear(G)
+    for k in range(nv):
+        for j in range(nv):
+            G[k, j] = near * columns[k, j]
+            G[nv + k, j] = far * columns[k, j]
+            G[nv + k, nv + j] = late * columns[k, j]
+    clear(columns)

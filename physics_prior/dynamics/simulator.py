@@ -80,10 +80,13 @@ class Simulator:
         self._check_inertia()
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray | None = None) -> np.ndarray:
-        """(nv,) vdot at q and v under the effects and generalized forces tau (nv,); fills ``rank``."""
+        """(nv,) vdot at q and v under the effects and generalized forces tau (nv,); fills ``rank``.
+
+        Raises:
+            SimulationError: not finite, where a posture leaves a joint no inertia (a straight chain of thin rods).
+        """
         vdot = np.zeros(self.nv)
-        extra = self._still if tau is None else tau
-        self.rank = self.step.evaluate(self.memory.array, q, v, extra, 0.0, vdot)
+        self._evaluate(q, v, self._still if tau is None else tau, vdot)
         return vdot
 
     def acceleration_derivatives(
@@ -219,11 +222,14 @@ class Simulator:
         About the joint, or the constraint's point. They go with the scene's own acceleration; with vdot given (a motion that
         was measured, not predicted) they are what that motion needs, and those of constraint effects are zero: inverse
         dynamics cannot tell them from joint forces.
+
+        Raises:
+            SimulationError: as ``acceleration``.
         """
         out = np.zeros((len(self.wrench_names), 6))
         count = len(self._links)
         if vdot is None:
-            self.rank = self.step.evaluate(self.memory.array, q, v, self._still, 0.0, self._vdot)
+            self._evaluate(q, v, self._still, self._vdot)
             constraint.load_links(self._work, self._pairs)
             for row, (_, first, last) in enumerate(self._labels, start=count):
                 own = self._pairs[first:last]
@@ -258,6 +264,15 @@ class Simulator:
         if not len(self._tangent):
             self._tangent = tangent_memory(len(self._links), self.rows, self.nv)
         return self._tangent
+
+    def _evaluate(self, q: np.ndarray, v: np.ndarray, extra: np.ndarray, vdot: np.ndarray) -> None:
+        self.rank = self.step.evaluate(self.memory.array, q, v, extra, 0.0, vdot)
+        finite = np.isfinite(vdot)
+        if not finite.all():
+            raise SimulationError(
+                f"the acceleration of '{self.tree.freedom_names[int(np.argmin(finite))]}' is not finite: the state is not,"
+                " or a joint carries no inertia in this posture (a straight chain of thin rods)"
+            )
 
     def _check_inertia(self) -> None:
         """Refuse joints that move no inertia, in any of a few postures (a point mass on a joint's axis, say)."""

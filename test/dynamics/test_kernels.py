@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from physics_prior import rotations
+from physics_prior import inertia, rotations
 from physics_prior.dynamics.formulations import generalized
 from physics_prior.dynamics.formulations.kinematics import kinematics
 from physics_prior.dynamics.simulator import Simulator
@@ -130,7 +130,8 @@ def test_momentum_of_a_free_tree_is_kept(random_tree, random_state):
 def test_state_that_is_not_finite_is_seen(double_pendulum):
     simulator = Simulator(double_pendulum, [GRAVITY])
     q, v = np.array([0.1, np.nan]), np.zeros(2)
-    assert not np.all(np.isfinite(simulator.acceleration(q, v)))
+    with pytest.raises(SimulationError, match="'shoulder' is not finite: the state is not"):
+        simulator.acceleration(q, v)
     with pytest.raises(SimulationError, match=r"not finite after a step of 0\.01 s"):
         simulator.advance(q, v, 0.01)
 
@@ -143,6 +144,23 @@ def test_joint_that_moves_no_inertia_is_refused_by_name():
     spin = Joint("spin", JointKind.REVOLUTE, "world", "bead")
     with pytest.raises(ModelError, match="'spin' moves no inertia"):
         Simulator(Tree([Part("bead", bead)], [spin]))
+
+
+def test_posture_without_inertia_is_refused():
+    """Two thin rods in line on a free root: nothing resists a turn about the line. Bent, as when it is built, all is well."""
+    rod = inertia.rod(1.0, 1.0)
+    free = Joint("root", JointKind.FREE, "world", "first")
+    elbow = Joint(
+        "elbow", JointKind.REVOLUTE, "first", "second", np.array([0.0, 0.0, 1.0]), axis=np.array([1.0, 0.0, 0.0])
+    )
+    simulator = Simulator(Tree([Part("first", rod), Part("second", rod)], [free, elbow]))
+    q = simulator.tree.neutral()
+    with pytest.raises(SimulationError, match="not finite"):
+        simulator.acceleration(q, np.zeros(simulator.nv))
+    with pytest.raises(SimulationError, match="not finite"):
+        simulator.wrenches(q, np.zeros(simulator.nv))
+    q[-1] = 1.0
+    assert np.isfinite(simulator.acceleration(q, np.zeros(simulator.nv))).all()
 
 
 def test_integrator_that_is_unknown_is_refused(double_pendulum):

@@ -246,7 +246,7 @@ def test_bad_numbers_are_named(options, sentence, tmp_path):
 def test_a_motion_that_leaves_the_numbers_leaves_no_bag(tmp_path):
     scene = load_scene("double_pendulum")
     scene = replace(scene, initial=replace(scene.initial, v=np.array([1e200, 0.0])))
-    with pytest.raises(SimulationError, match="the motion is not finite"):
+    with pytest.raises(SimulationError, match="is not finite"):
         simulate(scene, tmp_path / "bag")
     assert list(tmp_path.iterdir()) == []
 

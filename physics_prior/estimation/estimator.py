@@ -212,9 +212,13 @@ class Estimator:
         return self.ready
 
     def _put_newest(self, measurement: Measurement) -> None:
-        """Put a measurement after all others; a stamp newer than the waiting ones' tells that theirs are complete."""
+        """Put a measurement after all others; a stamp newer than the waiting ones' tells that theirs are complete.
+
+        Not one so far ahead that a start from them would be lost by then: then it is this one that waits.
+        """
         stamp = self._early[-1].stamp if self._early else measurement.stamp
-        if self.history or (measurement.stamp > stamp and self._start(stamp)):
+        complete = 0.0 < (measurement.stamp - stamp) * 1e-9 <= self.scene.health.lost_after
+        if self.history or (complete and self._start(stamp)):
             self.history.insert(measurement)
             return
         self._early = [each for each in self._early if each.stamp > measurement.stamp - START_WINDOW]

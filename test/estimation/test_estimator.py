@@ -265,6 +265,20 @@ def test_what_does_not_fit_is_rejected_with_a_sentence(every_source, measurement
     assert (estimator.counts.read, estimator.counts.rejected) == (1, 1)
 
 
+def test_a_strange_stamp_right_after_the_first_costs_nothing(every_source, moments_of):
+    """Three years ahead of measurements that a start is waiting in: it must not be predicted to from there."""
+    moments = moments_of(every_source, duration=0.3)
+    estimator = Estimator(every_source)
+    for measurement in moments[0].measurements:
+        estimator.add(measurement)
+    estimator.add(replace(moments[1].measurements[0], stamp=moments[0].stamp + 10**17))
+    assert not estimator.ready
+    for measurement in _stream(moments[1:6]):
+        estimator.add(measurement)
+    assert estimator.ready
+    assert estimator.stamp == moments[5].stamp
+
+
 @settings(max_examples=12)
 @given(seeds)
 def test_no_measurement_makes_it_raise_or_leave_the_numbers(every_source, moments_of, seed):

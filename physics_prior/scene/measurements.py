@@ -1,5 +1,6 @@
 """What a scene measures: which topic tells what about which part, and how noisily."""
 
+from abc import abstractmethod
 from typing import Annotated, ClassVar
 
 from pydantic import Field
@@ -21,9 +22,9 @@ class MeasurementSource(Section):
 
     topic: Topic
 
+    @abstractmethod
     def check(self, tree: Tree, place: Place) -> None:
         """Raise SceneError at its place in the file if the source does not fit the model."""
-        raise NotImplementedError
 
 
 class _PartSource(MeasurementSource):

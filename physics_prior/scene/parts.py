@@ -1,6 +1,7 @@
 """The model section of a scene file, made into a tree."""
 
 import os
+from abc import abstractmethod
 from typing import Any, Literal
 
 import numpy as np
@@ -32,12 +33,13 @@ class _Shape(Section):
     position: Position | None = None
     orientation: Orientation = (1.0, 0.0, 0.0, 0.0)
 
+    @abstractmethod
     def mass_properties(self, mass: float) -> MassProperties:
-        raise NotImplementedError
+        """Those of the uniform body of this mass, kg."""
 
+    @abstractmethod
     def drawn(self) -> tuple[Literal["box", "sphere", "ellipsoid", "cylinder", "capsule"], list[float]]:
         """Kind and size of the model's shape."""
-        raise NotImplementedError
 
 
 class _Box(_Shape):

@@ -17,7 +17,8 @@ ROOMS = [
     ("errors", "resources", "rotations"),
     ("inertia",),
     ("model",),
-    ("dynamics.kernel", "dynamics.types", "dynamics.algebra"),
+    ("dynamics.kernel", "dynamics.types", "dynamics.algebra", "dynamics.spatial")
+    + ("dynamics.rotation_vector", "dynamics.point_force"),
     ("effects",),
     ("dynamics",),
     ("scene",),

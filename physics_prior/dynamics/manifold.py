@@ -9,57 +9,8 @@ import math
 from physics_prior.dynamics.algebra import cross, plus, scale
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import FREE, SPHERICAL
-from physics_prior.dynamics.types import Array, Matrix, Records, Vector
-
-
-@inline_kernel
-def exponential(x: float, y: float, z: float) -> tuple[float, float, float, float]:
-    """The unit quaternion of a rotation vector, safe at zero."""
-    square = x * x + y * y + z * z
-    if square < 1e-8:
-        # sin(a/2)/a and cos(a/2) to the sixth order
-        s = 0.5 - square / 48.0 + square * square / 3840.0
-        return 1.0 - square / 8.0 + square * square / 384.0, s * x, s * y, s * z
-    angle = math.sqrt(square)
-    s = math.sin(0.5 * angle) / angle
-    return math.cos(0.5 * angle), s * x, s * y, s * z
-
-
-@inline_kernel
-def _skew_polynomial(theta: Vector, first: float, second: float) -> Matrix:
-    """The matrix I + first [theta]x + second [theta]x^2."""
-    x, y, z = theta
-    return (
-        1.0 - second * (y * y + z * z),
-        -first * z + second * x * y,
-        first * y + second * x * z,
-        first * z + second * x * y,
-        1.0 - second * (x * x + z * z),
-        -first * x + second * y * z,
-        -first * y + second * x * z,
-        first * x + second * y * z,
-        1.0 - second * (x * x + y * y),
-    )
-
-
-@inline_kernel
-def rotation_back(theta: Vector) -> Matrix:
-    """The matrix exp(theta)^T: how an error before a turn by theta reads after it."""
-    square = theta[0] * theta[0] + theta[1] * theta[1] + theta[2] * theta[2]
-    if square < 1e-8:
-        return _skew_polynomial(theta, -1.0 + square / 6.0, 0.5 - square / 24.0)
-    angle = math.sqrt(square)
-    return _skew_polynomial(theta, -math.sin(angle) / angle, (1.0 - math.cos(angle)) / square)
-
-
-@inline_kernel
-def right_jacobian(theta: Vector) -> Matrix:
-    """The right Jacobian of the exponential map (Sola 2017, eq. 183)."""
-    square = theta[0] * theta[0] + theta[1] * theta[1] + theta[2] * theta[2]
-    if square < 1e-6:
-        return _skew_polynomial(theta, -0.5 + square / 24.0, 1.0 / 6.0 - square / 120.0)
-    angle = math.sqrt(square)
-    return _skew_polynomial(theta, -(1.0 - math.cos(angle)) / square, (angle - math.sin(angle)) / (square * angle))
+from physics_prior.dynamics.rotation_vector import exponential, right_jacobian, rotation_back
+from physics_prior.dynamics.types import Array, Records, Vector
 
 
 @inline_kernel

@@ -7,33 +7,12 @@ import numpy as np
 from pydantic import Field
 
 from physics_prior import rotations
-from physics_prior.effects.effect import Anchor, Effect, PointPair
-from physics_prior.errors import ModelError
+from physics_prior.effects.effect import Anchor, PointPair
+from physics_prior.effects.two_points import TwoPoints, Vector
 from physics_prior.model import Tree
 
-Vector = tuple[float, float, float]
 
-
-class PinnedEffect(Effect):
-    """What all effects that join two points have in common."""
-
-    part: str = Field(description="the part that is held; the published force acts on it")
-    point: Vector = Field(default=(0.0, 0.0, 0.0), description="m, in the frame of `part`")
-    to: str = Field(default="world", description="what holds it: another part or 'world'")
-    at: Vector = Field(default=(0.0, 0.0, 0.0), description="m, in the frame of `to`")
-
-    def check(self, tree: Tree) -> None:
-        if tree.frame(self.part).link == tree.frame(self.to).link:
-            raise ModelError(
-                f"'{self.part}' and '{self.to}' are one rigid body: hold a part by another that can move away"
-            )
-
-    def anchors(self) -> tuple[Anchor, Anchor]:
-        """The holding point a and the held point b."""
-        return Anchor(self.to, np.array(self.at)), Anchor(self.part, np.array(self.point))
-
-
-class Attachment(PinnedEffect):
+class Attachment(TwoPoints):
     """A point pinned to a point: a ball joint that closes a loop, a hand on a rail. Three rows."""
 
     kind: ClassVar[str] = "attachment"
@@ -46,7 +25,7 @@ class Attachment(PinnedEffect):
         return (PointPair(a, b, np.eye(3)),)
 
 
-class Rod(PinnedEffect):
+class Rod(TwoPoints):
     """A massless rod: two points keep their distance. One row."""
 
     kind: ClassVar[str] = "rod"
@@ -61,7 +40,7 @@ class Rod(PinnedEffect):
         return (PointPair(a, b, np.array([[1.0, 0.0, 0.0]]), self.length),)
 
 
-class Hinge(PinnedEffect):
+class Hinge(TwoPoints):
     """A hinge that closes a loop: a common point and a common axis. Five rows."""
 
     kind: ClassVar[str] = "hinge"
@@ -81,7 +60,7 @@ class Hinge(PinnedEffect):
         return (PointPair(a, b, np.eye(3)), second)
 
 
-class Weld(PinnedEffect):
+class Weld(TwoPoints):
     """A part held in place and orientation. Six rows."""
 
     kind: ClassVar[str] = "weld"

@@ -1,10 +1,13 @@
-"""Compose the step of a scene: the template step.py with just the effects that the scene names.
+"""Compose the step of a scene: its equation of motion with just the effects that it names, its integrator, the step.
 
-The composed module is a small readable file in the kernel cache (``physics-prior check --show-step`` prints it). One
-line an effect; the effects inline into it, the disk cache hits on the next start, and an edit of an effect misses it as
-it must, because the module's name is a digest of its text in a folder keyed by all kernel sources.
+Three files of this folder, motion.py, one of integrators/ and step.py, become one module, in which each finds what it
+imports from those before it. The module is a small readable file in the kernel cache (``physics-prior check
+--show-step`` prints it). One line an effect; the effects inline into it, the disk cache hits on the next start, and an
+edit of an effect misses it as it must, because the module's name is a digest of its text in a folder keyed by all kernel
+sources.
 """
 
+import ast
 import hashlib
 import importlib.util
 import os
@@ -21,8 +24,7 @@ from physics_prior.dynamics.types import Array
 from physics_prior.effects.effect import Effect
 from physics_prior.model import Tree
 
-RUNGE_KUTTA, SEMI_IMPLICIT_EULER = "rk4", "semi_implicit_euler"
-INTEGRATORS = (RUNGE_KUTTA, SEMI_IMPLICIT_EULER)
+ROOM = "physics_prior.dynamics"
 GRAVITY = 3  # numbers at the head of the parameters
 
 
@@ -42,7 +44,7 @@ def section(parameters: Array, index: int) -> Array:
 
 def step_source(effects: Sequence[Effect], constrained: bool, integrator: str) -> str:
     """The text of a scene's step module."""
-    source = Path(__file__).with_name("step.py").read_text()
+    texts = {name: _text(name) for name in ("motion", f"integrators.{integrator}", "step")}
     calls: list[str] = []
     slopes: list[str] = []
     imports = ["from physics_prior.dynamics.compose import section"]
@@ -72,9 +74,9 @@ def step_source(effects: Sequence[Effect], constrained: bool, integrator: str) -
             + "\n".join(slopes)
             + "\n"
         )
-        source = _replace(source, "effects", composed)
-    source = _replace(source, "constraints", f"CONSTRAINED = {constrained}")
-    return _replace(source, "integrator", f"RUNGE_KUTTA = {integrator == RUNGE_KUTTA}")
+        texts["motion"] = _replace(texts["motion"], "effects", composed)
+    texts["motion"] = _replace(texts["motion"], "constraints", f"CONSTRAINED = {constrained}")
+    return "\n\n".join(texts.values())
 
 
 def step_module(effects: Sequence[Effect], constrained: bool, integrator: str) -> ModuleType:
@@ -97,6 +99,17 @@ def step_module(effects: Sequence[Effect], constrained: bool, integrator: str) -
     sys.modules[name] = module
     spec.loader.exec_module(module)
     return module
+
+
+def _text(name: str) -> str:
+    """The text of a part of the step, without what it imports from the parts before it: there it stands already."""
+    source = Path(__file__).parent.joinpath(*name.split(".")).with_suffix(".py").read_text()
+    lines = source.splitlines()
+    parts = (f"{ROOM}.motion", f"{ROOM}.integrators.")
+    for node in reversed(ast.parse(source).body):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(parts):
+            del lines[node.lineno - 1 : node.end_lineno]
+    return "\n".join(lines) + "\n"
 
 
 def _replace(source: str, mark: str, by: str) -> str:

@@ -17,11 +17,13 @@ from physics_prior.dynamics.kernel import inline_kernel
 from physics_prior.dynamics.records import LINK, PAIR, WORK
 from physics_prior.dynamics.types import Array
 
-HEAD = 8
+HEAD = 10
+TIME, TOLERANCE, VECTORS, WORKSPACE = 6, 7, 8, 9
+"""Where the head has the time since the scene's beginning, s, the integrator's tolerance and the sizes of its scratch."""
 LINK_SIZE, WORK_SIZE, PAIR_SIZE = LINK.itemsize // 8, WORK.itemsize // 8, PAIR.itemsize // 8
 FREEDOM_SIZE, COMPOSITE_SIZE, GAP_SIZE = FREEDOM.itemsize // 8, COMPOSITE.itemsize // 8, GAP.itemsize // 8
 FLOAT = np.dtype(np.float64)
-SPARE = 9  # vectors (nv,) of scratch
+SPARE = 9  # vectors (nv,) of scratch that every step needs
 
 
 class Memory:
@@ -34,10 +36,20 @@ class Memory:
         known: (nq + 2,) the configuration whose factors and rows stand in the memory, their rank, and the position error, m,
             that projection may leave there.
         parameters: the numbers of the effects.
+
+    vectors (nv,) of scratch, SPARE or more, and the size of ``tangent_memory`` in it are what the integrator needs.
     """
 
     def __init__(
-        self, links: np.ndarray, pairs: np.ndarray, width: int, parameters: np.ndarray, nq: int, nv: int
+        self,
+        links: np.ndarray,
+        pairs: np.ndarray,
+        width: int,
+        parameters: np.ndarray,
+        nq: int,
+        nv: int,
+        vectors: int = SPARE,
+        workspace: int = 0,
     ) -> None:
         m = int(pairs["rows"].sum())
         sizes = [
@@ -47,17 +59,19 @@ class Memory:
             (m + 3) * (2 * width + 2 * m),
             nq + 2,
             nq,
-            SPARE * nv,
+            vectors * nv,
+            workspace,
             len(parameters),
         ]
         ends = HEAD + np.cumsum([0, *sizes])
         self.array = np.zeros(ends[-1])
         self.array[:6] = len(links), len(pairs), m, nq, nv, sizes[3]
+        self.array[VECTORS], self.array[WORKSPACE] = vectors, workspace
         own = [self.array[a:b] for a, b in pairwise(ends)]
         self.links, self.work, self.pairs = own[0].view(LINK), own[1].view(WORK), own[2].view(PAIR)
         self.rows = own[3].reshape(m + 3, 2 * width + 2 * m)
-        self.known, self.parameters = own[4], own[7]
-        self.spare = own[6].reshape(SPARE, nv)
+        self.known, self.parameters = own[4], own[8]
+        self.spare = own[6].reshape(vectors, nv)
         self.links[:], self.pairs[:], self.parameters[:] = links, pairs, parameters
 
 
@@ -78,31 +92,32 @@ def sections(memory: Array) -> Any:
 
     Bare arrays at addresses in the memory, which the caller holds: views would count references at 5 ns each.
     """
-    n, p, m = int(memory[0]), int(memory[1]), int(memory[2])
+    n, couples, m = int(memory[0]), int(memory[1]), int(memory[2])
     nq, nv = int(memory[3]), int(memory[4])
     a = HEAD + n * LINK_SIZE
     b = a + n * WORK_SIZE
-    c = b + p * PAIR_SIZE
+    c = b + couples * PAIR_SIZE
     d = c + int(memory[5])
     e = d + nq + 2
     f = e + nq
-    g = f + SPARE * nv
+    g = f + int(memory[VECTORS]) * nv
+    p = g + int(memory[WORKSPACE])
     return (
         carray(address(memory, HEAD), n, LINK),
         carray(address(memory, a), n, WORK),
-        carray(address(memory, b), p, PAIR),
+        carray(address(memory, b), couples, PAIR),
         carray(address(memory, c), (m + 3, (d - c) // (m + 3)), FLOAT),
         carray(address(memory, d), nq + 2, FLOAT),
         carray(address(memory, e), nq, FLOAT),
-        carray(address(memory, f), (SPARE, nv), FLOAT),
-        carray(address(memory, g), memory.shape[0] - g, FLOAT),
+        carray(address(memory, f), (int(memory[VECTORS]), nv), FLOAT),
+        carray(address(memory, p), memory.shape[0] - p, FLOAT),
     )
 
 
-def tangent_memory(n: int, m: int, nv: int) -> np.ndarray:
-    """What derivatives need beside the memory, for n links, m rows and nv degrees of freedom."""
-    matrices = 2 * nv * nv + (nv + 4 * m) * nv + 7 * nv * 2 * nv + correction_size(m, nv, 2 * nv)
-    return np.zeros(matrices + nv * FREEDOM_SIZE + n * COMPOSITE_SIZE + nv * GAP_SIZE)
+def tangent_size(n: int, m: int, nv: int, stages: int) -> int:
+    """Numbers that derivatives need beside the memory, for n links, m rows, nv degrees of freedom and stages (nv, 2 nv)."""
+    matrices = 2 * nv * nv + (nv + 4 * m) * nv + correction_size(m, nv, 2 * nv) + stages * nv * 2 * nv
+    return int(matrices + nv * FREEDOM_SIZE + n * COMPOSITE_SIZE + nv * GAP_SIZE)
 
 
 @inline_kernel
@@ -125,22 +140,22 @@ def correction_sections(scratch: Array, m: int, nv: int, k: int) -> Any:
 
 @inline_kernel
 def tangent_sections(tangent: Array, n: int, m: int, nv: int) -> Any:
-    """The sections: derivative (nv, 2 nv), matrices (nv + 4 m, nv), stages (7, nv, 2 nv), scratch, records.
+    """The sections: derivative (nv, 2 nv), matrices (nv + 4 m, nv), scratch, records, stages (s, nv, 2 nv).
 
     The records are those of freedoms, composites and gaps.
     """
     a = 2 * nv * nv
     b = a + (nv + 4 * m) * nv
-    c = b + 14 * nv * nv
-    d = c + correction_size(m, nv, 2 * nv)
-    e = d + nv * FREEDOM_SIZE
-    f = e + n * COMPOSITE_SIZE
+    c = b + correction_size(m, nv, 2 * nv)
+    d = c + nv * FREEDOM_SIZE
+    e = d + n * COMPOSITE_SIZE
+    f = e + nv * GAP_SIZE
     return (
         carray(address(tangent, 0), (nv, 2 * nv), FLOAT),
         carray(address(tangent, a), (nv + 4 * m, nv), FLOAT),
-        carray(address(tangent, b), (7, nv, 2 * nv), FLOAT),
-        carray(address(tangent, c), d - c, FLOAT),
-        carray(address(tangent, d), nv, FREEDOM),
-        carray(address(tangent, e), n, COMPOSITE),
-        carray(address(tangent, f), nv, GAP),
+        carray(address(tangent, b), c - b, FLOAT),
+        carray(address(tangent, c), nv, FREEDOM),
+        carray(address(tangent, d), n, COMPOSITE),
+        carray(address(tangent, e), nv, GAP),
+        carray(address(tangent, f), ((tangent.shape[0] - f) // (2 * nv * nv), nv, 2 * nv), FLOAT),
     )

@@ -7,8 +7,9 @@ import numpy as np
 
 from physics_prior import rotations
 from physics_prior.dynamics import constraint, kinematics, manifold, newton_euler, projection
-from physics_prior.dynamics.compose import GRAVITY, INTEGRATORS, RUNGE_KUTTA, pack_parameters, step_module
-from physics_prior.dynamics.memory import Memory, correction_size, tangent_memory
+from physics_prior.dynamics.compose import GRAVITY, pack_parameters, step_module
+from physics_prior.dynamics.integrators import DEFAULT, INTEGRATORS, IntegratorName
+from physics_prior.dynamics.memory import SPARE, TIME, Memory, correction_size, tangent_size
 from physics_prior.dynamics.records import link_records, moved_freedoms, pair_records
 from physics_prior.effects.effect import Effect, PointPair
 from physics_prior.errors import ModelError, SimulationError
@@ -35,7 +36,7 @@ class Simulator:
         tree, effects, integrator: what it was built from.
         nq, nv, rows: sizes of configuration, velocity and constraint rows.
         wrench_names: whose wrenches there are: moving joints, then effects that hold something.
-        step, memory: the compiled step (step.py as composed for the scene) and the array it works in (memory.py).
+        step, memory: the compiled step (compose.py) and the array it works in (memory.py).
         rank: rank of the constraint rows at the last evaluation (below ``rows`` where some are redundant: then the motion is
             unique, the split of forces is not).
 
@@ -43,7 +44,7 @@ class Simulator:
         ModelError: a joint that moves no inertia; an effect that does not fit the tree.
     """
 
-    def __init__(self, tree: Tree, effects: Sequence[Effect] = (), integrator: str = RUNGE_KUTTA) -> None:
+    def __init__(self, tree: Tree, effects: Sequence[Effect] = (), integrator: IntegratorName = DEFAULT) -> None:
         if integrator not in INTEGRATORS:
             raise ModelError(f"integrator '{integrator}' is unknown: known are {list(INTEGRATORS)}")
         for effect in effects:
@@ -61,6 +62,8 @@ class Simulator:
         self.rows = sum(1 if pair.length is not None else len(pair.directions) for pair in pairs)
         self.rank = 0
         records = pair_records(tree, pairs)
+        needs = INTEGRATORS[integrator]
+        self._tangent_size = tangent_size(len(tree.links), self.rows, self.nv, needs.stages)
         memory = Memory(
             link_records(tree, records),
             records,
@@ -68,6 +71,8 @@ class Simulator:
             pack_parameters(tree, effects),
             self.nq,
             self.nv,
+            SPARE + needs.vectors,
+            self._tangent_size if needs.implicit else 0,
         )
         self.memory = memory
         self._links, self._work, self._pairs = memory.links, memory.work, memory.pairs
@@ -102,14 +107,10 @@ class Simulator:
         """Move q and v in place by count steps of h seconds, under constant extra forces tau (nv,).
 
         Raises:
-            SimulationError: the motion left the numbers (a step far too large for it).
+            SimulationError: the motion left the numbers, or an integrator found no solution (a step far too large for it).
         """
         extra = self._still if tau is None else tau
-        self.rank = self.step.advance(self.memory.array, q, v, extra, h, count)
-        if self.rank < 0:
-            raise SimulationError(
-                f"the motion is not finite after a step of {h:g} s: a smaller step size or the other integrator may do"
-            )
+        self.rank = self._moved(self.step.advance(self.memory.array, q, v, extra, h, count), h)
 
     def linearise(
         self, q: np.ndarray, v: np.ndarray, h: float, force_noise: np.ndarray
@@ -119,11 +120,13 @@ class Simulator:
         F is the derivative of the new error state (tangent of q, v) by the old. G G^T is the covariance that white
         generalized forces of density force_noise (nv,) [N sqrt(s) or N m sqrt(s)] add. Both lie in the tangent space of the
         constraints.
+
+        Raises:
+            SimulationError: an integrator found no solution.
         """
         F, G = np.empty((2 * self.nv, 2 * self.nv)), np.empty((2 * self.nv, 2 * self.nv))
-        self.rank = self.step.linearise(
-            self.memory.array, self.tangent_array(), q, v, self._still, h, force_noise, F, G
-        )
+        rank = self.step.linearise(self.memory.array, self.tangent_array(), q, v, self._still, h, force_noise, F, G)
+        self.rank = self._moved(rank, h)
         return F, G
 
     def project(self, q: np.ndarray, v: np.ndarray) -> float:
@@ -255,6 +258,15 @@ class Simulator:
         }
 
     @property
+    def time(self) -> float:
+        """The time since the scene's beginning, s, which steps move on; settable."""
+        return float(self.memory.array[TIME])
+
+    @time.setter
+    def time(self, value: float) -> None:
+        self.memory.array[TIME] = value
+
+    @property
     def effort(self) -> np.ndarray:
         """(nv,) generalized forces of the effects at the last ``acceleration`` or ``wrenches``."""
         return np.array(self.memory.spare[2])
@@ -262,8 +274,20 @@ class Simulator:
     def tangent_array(self) -> np.ndarray:
         """What derivatives need beside the memory (memory.py), made when first needed."""
         if not len(self._tangent):
-            self._tangent = tangent_memory(len(self._links), self.rows, self.nv)
+            self._tangent = np.zeros(self._tangent_size)
         return self._tangent
+
+    def _moved(self, rank: int, h: float) -> int:
+        """The rank that a step returned, refused where it is negative."""
+        if rank == -1:
+            raise SimulationError(
+                f"the motion is not finite after a step of {h:g} s: a smaller step size or another integrator may do"
+            )
+        if rank < 0:
+            raise SimulationError(
+                f"the integrator '{self.integrator}' found no solution of a step of {h:g} s: a smaller step size may do"
+            )
+        return rank
 
     def _evaluate(self, q: np.ndarray, v: np.ndarray, extra: np.ndarray, vdot: np.ndarray) -> None:
         self.rank = self.step.evaluate(self.memory.array, q, v, extra, 0.0, vdot)

@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, JsonValue, PlainValidator, model_validator
 
 from physics_prior import rotations
+from physics_prior.dynamics.integrators import DEFAULT, IntegratorName
 from physics_prior.errors import ModelError
 from physics_prior.scene.quantity import parse_quantity, quantity
 from physics_prior.scene.section import Section
@@ -154,7 +155,7 @@ class ModelSection(Section):
 class Step(Section):
     """Time stepping: the integrator and its step size, s."""
 
-    integrator: Literal["rk4", "semi_implicit_euler"] = "rk4"
+    integrator: IntegratorName = DEFAULT
     size: PositiveTime = 1e-3
 
 

@@ -20,7 +20,6 @@ import numba
 import numpy as np
 from rich.table import Table
 
-from physics_prior.dynamics.compose import SEMI_IMPLICIT_EULER
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects.attachment import Attachment
 from physics_prior.effects.gravity import Gravity
@@ -76,7 +75,7 @@ class Ours:
             Attachment(name=anchor.part, part=anchor.part, point=tuple(anchor.point), at=tuple(point))
             for anchor, point in zip(HELD_FEET, self.points, strict=True)
         ]
-        self.held = Simulator(self.tree, [Gravity(), *holds], SEMI_IMPLICIT_EULER)
+        self.held = Simulator(self.tree, [Gravity(), *holds], "semi_implicit_euler")
         self.postures = []
         for _ in range(2):
             q = self.tree.integrate(start, rng.normal(scale=0.05, size=self.tree.nv))

@@ -1,12 +1,14 @@
 """A scene's step holds the effects that it names and nothing else; an edit of an effect is never missed."""
 
+import ast
 import importlib.util
 import sys
 
 import numpy as np
 import pytest
 
-from physics_prior.dynamics.compose import GRAVITY, INTEGRATORS, RUNGE_KUTTA, pack_parameters, step_module, step_source
+from physics_prior.dynamics.compose import GRAVITY, pack_parameters, step_module, step_source
+from physics_prior.dynamics.integrators import INTEGRATORS
 from physics_prior.dynamics.kernel import cache_directory
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects.attachment import Attachment
@@ -16,6 +18,7 @@ from physics_prior.effects.joint_damping import JointDamping
 EFFECT = """
 from typing import ClassVar
 
+from physics_prior.dynamics.integrators import INTEGRATORS
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.effects.effect import CompiledForce, Effect
 
@@ -56,23 +59,35 @@ def own_effect(tmp_path):
 
 
 def test_step_of_no_force_is_the_template(double_pendulum):
-    """Gravity and constraints are no force functions; the template's lines but the marked three stand as they are."""
-    plain = step_source([], False, RUNGE_KUTTA)
-    assert plain == step_source([Gravity()], False, RUNGE_KUTTA)
+    """Gravity and constraints are no force functions; lines of the equation of motion but the two marked stand as they are."""
+    plain = step_source([], False, "rk4")
+    assert plain == step_source([Gravity()], False, "rk4")
     assert "none import differentiate_forces, forces" in plain
     assert "CONSTRAINED = False" in plain
-    held = step_source([Gravity(), Attachment(part="lower")], True, "semi_implicit_euler")
+    held = step_source([Gravity(), Attachment(part="lower")], True, "rk4")
     changed = [(a, b) for a, b in zip(plain.splitlines(), held.splitlines(), strict=True) if a != b]
-    assert [new.split(" = ")[0] for _, new in changed] == ["CONSTRAINED", "RUNGE_KUTTA"]
+    assert changed == [("CONSTRAINED = False", "CONSTRAINED = True")]
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_step_is_motion_integrator_and_step_in_one_module(integrator):
+    """Each names what it takes from those before it, and imports it from nowhere else."""
+    text = step_source([], False, integrator)
+    imports = [node.module for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ImportFrom)]
+    assert not any("motion" in module or "integrators" in module for module in imports)
+    functions = [node.name for node in ast.parse(text).body if isinstance(node, ast.FunctionDef)]
+    order = [functions.index(name) for name in ("evaluate", "smooth_step", "linearise_smooth", "advance", "linearise")]
+    assert order == sorted(order)
+    assert len(functions) == len(set(functions))
 
 
 def test_step_names_its_effects_only():
-    text = step_source([Gravity(), JointDamping(coefficients={"elbow": 1.0})], False, RUNGE_KUTTA)
+    text = step_source([Gravity(), JointDamping(coefficients={"elbow": 1.0})], False, "rk4")
     assert "apply_joint_damping(section(parameters, 0), links, work, q, v, tau)" in text
     assert "differentiate_joint_damping(section(parameters, 0), links, work, q, v, tau_q, tau_v)" in text
     assert "effects.none" not in text
     assert text.count("physics_prior.effects") == 2
-    assert "scene:" not in text.split('"""', 2)[2]
+    assert not any(line.endswith((" scene: effects", " scene: constraints")) for line in text.splitlines())
 
 
 def test_numbers_of_an_effect_stand_where_its_call_looks(double_pendulum):
@@ -97,14 +112,14 @@ def test_step_without_an_effect_is_bit_identical_to_one_where_it_does_nothing(do
 def test_step_module_is_shared_by_scenes_of_the_same_effects(double_pendulum, heavy_top):
     modules = {Simulator(tree, [Gravity()]).step for tree in (double_pendulum, heavy_top)}
     assert len(modules) == 1
-    assert len({step_module([], False, integrator) for integrator in INTEGRATORS}) == 2
+    assert len({step_module([], False, integrator) for integrator in INTEGRATORS}) == len(INTEGRATORS)
 
 
 def test_edited_effect_is_another_step(own_effect, double_pendulum):
     first = own_effect("bench_push", 1.0)
-    before = step_source([first], False, RUNGE_KUTTA)
+    before = step_source([first], False, "rk4")
     edited = own_effect("bench_push", 2.0)
-    assert step_source([edited], False, RUNGE_KUTTA) != before
+    assert step_source([edited], False, "rk4") != before
 
 
 def test_effects_of_one_function_name_keep_apart(own_effect, double_pendulum):

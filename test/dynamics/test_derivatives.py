@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from physics_prior.dynamics.compose import RUNGE_KUTTA, SEMI_IMPLICIT_EULER
+from physics_prior.dynamics.integrators import INTEGRATORS
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects.attachment import Attachment, Hinge, Rod
 from physics_prior.effects.effect import Effect
@@ -138,7 +138,7 @@ def test_tangent_rows(kind, random_tree, random_state):
 
 
 @pytest.mark.parametrize("seed", range(6))
-@pytest.mark.parametrize("integrator", [RUNGE_KUTTA, SEMI_IMPLICIT_EULER])
+@pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_step_of_a_tree(seed, integrator, random_tree, random_state):
     rng = np.random.default_rng(seed)
     tree = random_tree(rng, massless=True)
@@ -149,7 +149,7 @@ def test_step_of_a_tree(seed, integrator, random_tree, random_state):
     assert off(F, expected) < 1e-7  # measured 1e-9
 
 
-@pytest.mark.parametrize("integrator", [RUNGE_KUTTA, SEMI_IMPLICIT_EULER])
+@pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_step_of_a_tree_with_damping(integrator, random_tree, random_state):
     rng = np.random.default_rng(4)
     tree = random_tree(rng, size=5, root=JointKind.FREE)
@@ -166,7 +166,7 @@ def test_linearise_makes_the_step_of_advance(random_tree, random_state):
     rng = np.random.default_rng(2)
     tree, effect, q, v = held(rng, random_tree, random_state, "loop")
     for effects in ([GRAVITY], [GRAVITY, effect]):
-        for integrator in (RUNGE_KUTTA, SEMI_IMPLICIT_EULER):
+        for integrator in INTEGRATORS:
             simulator = Simulator(tree, effects, integrator)
             a, b, c, d = q.copy(), v.copy(), q.copy(), v.copy()
             simulator.advance(a, b, 1e-3)
@@ -179,7 +179,7 @@ def test_linearise_makes_the_step_of_advance(random_tree, random_state):
     ("integrator", "bound"),
     # RK4 leaves the constraints by O(h^5) a step, Euler by O(h^2): so far off F is, which takes the projection for that
     # at the end; measured 3e-8 and 3e-4 at h = 1 ms, 3e-6 at 0.1 ms (Euler, kinds alike)
-    [(RUNGE_KUTTA, 1e-6), (SEMI_IMPLICIT_EULER, 5e-3)],
+    [("rk4", 1e-6), ("semi_implicit_euler", 5e-3)],
 )
 @pytest.mark.parametrize("kind", ["attachment", "hinge", "loop", "rod"])
 def test_constrained_step_along_the_constraints(kind, integrator, bound, random_tree, random_state):

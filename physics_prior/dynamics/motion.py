@@ -1,0 +1,187 @@
+"""The equation of motion of a scene, compiled: evaluate, differentiate, project.
+
+This file is that of a scene without force effects and without constraints. For any other scene the composer
+(dynamics/compose.py) copies it into the scene's step with the lines marked ``scene`` replaced, so that it holds the
+effects that the scene names and nothing else. ``memory`` is that of memory.py.
+"""
+
+import math
+
+from physics_prior.dynamics.arrays import add_product, clear, copy, subtract_transposed_product
+from physics_prior.dynamics.articulated_body import accelerate, factorize
+from physics_prior.dynamics.constraint import (
+    POSITION_TOLERANCE,
+    constrain_acceleration,
+    multiply_columns,
+    refresh,
+    responses,
+    row_count,
+)
+from physics_prior.dynamics.constraint_derivatives import differentiate_rows
+from physics_prior.dynamics.derivatives import inverse_dynamics_derivatives, sweep
+from physics_prior.dynamics.gyroscopic import take_at_middle
+from physics_prior.dynamics.kernel import kernel
+from physics_prior.dynamics.kinematics import flow, pose, weigh
+from physics_prior.dynamics.mass_factor import factorize_mass, solve_mass
+from physics_prior.dynamics.memory import correction_sections, sections, tangent_sections
+from physics_prior.dynamics.projection import project
+from physics_prior.dynamics.types import Array
+from physics_prior.effects.none import differentiate_forces, forces  # scene: effects
+
+CONSTRAINED = False  # scene: constraints
+
+
+@kernel
+def evaluate(memory: Array, q: Array, v: Array, extra: Array, step: float, vdot: Array) -> int:
+    """Fill vdot (nv,) at q and v under the effects and extra generalized forces (nv,); return the constraints' rank.
+
+    step > 0 takes gyroscopic torques at the middle of such a step.
+    """
+    links, work, pairs, rows, known, _, spare, parameters = sections(memory)
+    gravity, tau = parameters[:3], spare[2]
+    rank = 0
+    if CONSTRAINED:
+        rank = refresh(links, work, pairs, rows, known, q)
+    else:
+        pose(links, work, q)
+        weigh(links, work)
+        factorize(links, work)
+    flow(links, work, v)
+    if step > 0.0:
+        take_at_middle(links, work, step)
+    copy(extra, tau)
+    forces(parameters, links, work, q, v, tau)
+    accelerate(links, work, tau, gravity, vdot)
+    if CONSTRAINED:
+        constrain_acceleration(links, work, pairs, rows, gravity, vdot, spare)
+    return rank
+
+
+@kernel
+def differentiate(memory: Array, tangent: Array, q: Array, v: Array, step: float) -> None:
+    """Fill the tangent's derivative (nv, 2 nv): of vdot by the tangent of q, and beside it by v.
+
+    Needs ``evaluate`` at the same state.
+    """
+    links, work, pairs, rows, _, _, spare, parameters = sections(memory)
+    m, nv = row_count(rows), v.shape[0]
+    derivative, matrices, scratch, freedoms, composites, gaps, _ = tangent_sections(tangent, links.shape[0], m, nv)
+    gravity, M, tau_q, tau_v = parameters[:3], matrices[0:nv], derivative[:, :nv], derivative[:, nv:]
+    clear(derivative)
+    sweep(links, work, gravity, step, freedoms, composites)
+    inverse_dynamics_derivatives(links, freedoms, composites, tau_q, tau_v, M)
+    A, A_q = matrices[nv : nv + m], matrices[nv + m : nv + 2 * m]
+    rows_q, rows_v = matrices[nv + 2 * m : nv + 3 * m], matrices[nv + 3 * m : nv + 4 * m]
+    if CONSTRAINED:
+        differentiate_rows(links, work, pairs, freedoms, composites, gravity, gaps, A, A_q, rows_q, rows_v, tau_q)
+    for i in range(nv):
+        own = derivative[i]
+        for j in range(2 * nv):
+            own[j] = -own[j]
+    differentiate_forces(parameters, links, work, q, v, tau_q, tau_v)
+    factorize_mass(freedoms, M)
+    solve_mass(freedoms, M, derivative)
+    if CONSTRAINED:
+        response, right, answer, change = correction_sections(scratch, m, nv, 2 * nv)
+        responses(links, work, rows, spare[0], response)
+        clear(right)
+        add_product(A, derivative, right)
+        for r in range(m):
+            for j in range(nv):
+                right[r, j] += rows_q[r, j]
+                right[r, nv + j] += rows_v[r, j]
+        multiply_columns(rows, right, answer, change)
+        subtract_transposed_product(response, answer, derivative)
+
+
+@kernel
+def differentiate_acceleration(memory: Array, tangent: Array, q: Array, v: Array, extra: Array) -> int:
+    """Fill the tangent's derivative of ``evaluate`` at q, v and extra, gyroscopic torques explicit; return the rank."""
+    rank = evaluate(memory, q, v, extra, 0.0, sections(memory)[6][3])
+    differentiate(memory, tangent, q, v, 0.0)
+    return rank
+
+
+@kernel
+def project_columns(memory: Array, A: Array, A_q: Array, columns: Array, scratch: Array) -> None:
+    """Put the columns (2 nv, k) of errors of q and v onto the constraints' tangent space, in the mass metric.
+
+    A dq = 0 and A dv + d(A v)/dq dq = 0: the covariance then has no mass in forbidden directions. Needs ``refresh``, and
+    scratch of ``correction_size``.
+    """
+    links, work, _, rows, _, _, spare, _ = sections(memory)
+    m, nv = A.shape
+    by_q, by_v = columns[:nv], columns[nv:]
+    response, right, answer, change = correction_sections(scratch, m, nv, columns.shape[1])
+    responses(links, work, rows, spare[0], response)
+    clear(right)
+    add_product(A, by_q, right)
+    multiply_columns(rows, right, answer, change)
+    subtract_transposed_product(response, answer, by_q)
+    clear(right)
+    add_product(A, by_v, right)
+    add_product(A_q, by_q, right)
+    multiply_columns(rows, right, answer, change)
+    subtract_transposed_product(response, answer, by_v)
+
+
+@kernel
+def tangent_rows(memory: Array, tangent: Array, q: Array, v: Array, A: Array, A_q: Array) -> None:
+    """Fill A (m, nv) and A_q (m, nv), the constraint Jacobian and the derivative of A v by q, at q and v."""
+    links, work, pairs, rows, known, _, _, parameters = sections(memory)
+    m, nv = row_count(rows), v.shape[0]
+    derivative, matrices, _, freedoms, composites, gaps, _ = tangent_sections(tangent, links.shape[0], m, nv)
+    refresh(links, work, pairs, rows, known, q)
+    flow(links, work, v)
+    sweep(links, work, parameters[:3], 0.0, freedoms, composites)
+    rows_q, rows_v = matrices[nv + 2 * m : nv + 3 * m], matrices[nv + 3 * m : nv + 4 * m]
+    differentiate_rows(
+        links, work, pairs, freedoms, composites, parameters[:3], gaps, A, A_q, rows_q, rows_v, derivative[:, :nv]
+    )
+
+
+@kernel
+def settle(memory: Array, q: Array, v: Array) -> None:
+    """Put q (nq,) and v (nv,) back onto the constraints, as every step ends; needs ``evaluate`` near q."""
+    links, work, pairs, rows, known, _, spare, _ = sections(memory)
+    if CONSTRAINED:
+        project(links, work, pairs, rows, known, q, v, spare, POSITION_TOLERANCE)
+
+
+@kernel
+def settle_tangent(memory: Array, tangent: Array, q: Array, v: Array, F: Array, G: Array) -> None:
+    """``settle``, and put the columns of F and G (2 nv, 2 nv) onto the constraints' tangent space."""
+    links, _, _, rows, _, _, _, _ = sections(memory)
+    if CONSTRAINED:
+        m, nv = row_count(rows), v.shape[0]
+        _, matrices, scratch, _, _, _, _ = tangent_sections(tangent, links.shape[0], m, nv)
+        A, A_q = matrices[nv : nv + m], matrices[nv + m : nv + 2 * m]
+        settle(memory, q, v)
+        tangent_rows(memory, tangent, q, v, A, A_q)
+        project_columns(memory, A, A_q, F, scratch)
+        project_columns(memory, A, A_q, G, scratch)
+
+
+@kernel
+def spread_noise(memory: Array, tangent: Array, force_noise: Array, h: float, G: Array) -> None:
+    """Fill G (2 nv, 2 nv) from white generalized forces over a step of h seconds; needs ``differentiate`` at its beginning.
+
+    G G^T = integral of B B^T with B = M^-1 force_noise: the double integrator's exact second moments.
+    """
+    links, _, _, rows, _, _, _, _ = sections(memory)
+    m, nv = row_count(rows), force_noise.shape[0]
+    _, matrices, scratch, freedoms, _, _, stages = tangent_sections(tangent, links.shape[0], m, nv)
+    columns, M = stages[0], matrices[0:nv]
+    clear(columns)
+    near, far, late = h * math.sqrt(h / 3.0), 0.5 * math.sqrt(3.0 * h), 0.5 * math.sqrt(h)
+    for k in range(nv):
+        columns[k, k] = force_noise[k]
+    solve_mass(freedoms, M, columns)
+    clear(G)
+    for k in range(nv):
+        for j in range(nv):
+            G[k, j] = near * columns[k, j]
+            G[nv + k, j] = far * columns[k, j]
+            G[nv + k, nv + j] = late * columns[k, j]
+    if CONSTRAINED:
+        project_columns(memory, matrices[nv : nv + m], matrices[nv + m : nv + 2 * m], G, scratch)

@@ -8,8 +8,11 @@ from physics_prior import rotations
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects import REGISTRY
 from physics_prior.effects.attachment import Attachment, Hinge, Rod, Weld
+from physics_prior.effects.drag import Drag
 from physics_prior.effects.gravity import Gravity
 from physics_prior.effects.joint_damping import JointDamping
+from physics_prior.effects.joint_spring import JointSpring
+from physics_prior.effects.spring import Spring
 from physics_prior.errors import ModelError
 from physics_prior.inertia import box
 from physics_prior.model import Joint, JointKind, Part, Tree
@@ -33,7 +36,9 @@ def tree():
 
 def test_registry_names_every_effect_by_its_kind():
     assert all(effect.kind == kind for kind, effect in REGISTRY.items())
-    assert {"gravity", "joint_damping", "attachment", "rod", "hinge", "weld"} <= set(REGISTRY)
+    assert {"gravity", "joint_damping", "joint_spring", "spring", "drag", "attachment", "rod", "hinge", "weld"} <= set(
+        REGISTRY
+    )
 
 
 @pytest.mark.parametrize(
@@ -41,6 +46,9 @@ def test_registry_names_every_effect_by_its_kind():
     [
         (Gravity(), 0),
         (JointDamping(coefficients={"elbow": 1.0}), 0),
+        (JointSpring(stiffness={"elbow": 1.0, "wrist": 2.0}, rest={"elbow": 0.3}), 0),
+        (Spring(part="tip", stiffness=10.0, damping=1.0), 0),
+        (Drag(part="tip", quadratic=0.1, wind=(1, 0, 0)), 0),
         (Attachment(part="tip"), 3),
         (Rod(part="tip", length=0.5), 1),
         (Hinge(part="tip", axis=(0, 0, 2), to_axis=(0, 0, 1)), 5),
@@ -64,6 +72,24 @@ def test_effects_explain_themselves_and_count_their_rows(tree, effect, rows):
         (Weld(part="tip", to="cap"), "'tip' and 'cap' are one rigid body"),
         (JointDamping(coefficients={"flight": 1.0}), "joint 'flight' is free"),
         (JointDamping(coefficients={"glue": 1.0}), "joint 'glue' is unknown or fixed"),
+        (JointSpring(stiffness={"flight": 1.0}), "joint 'flight' is free: a joint spring acts in"),
+        (JointSpring(stiffness={"knee": 1.0}), "joint 'knee' is unknown or fixed: moving joints are"),
+        (JointSpring(stiffness={"elbow": 1.0}, rest={"wrist": (1, 0, 0, 0)}), "joint 'wrist' has no stiffness"),
+        (JointSpring(stiffness={"elbow": 1.0}, damping={"wrist": 1.0}), "joint 'wrist' has no stiffness"),
+        (
+            JointSpring(stiffness={"wrist": 1.0}, rest={"wrist": 0.5}),
+            "joint 'wrist' is spherical: its rest is a quatern",
+        ),
+        (
+            JointSpring(stiffness={"elbow": 1.0}, rest={"elbow": (1, 0, 0, 0)}),
+            "'elbow' is revolute: its rest is one number",
+        ),
+        (JointSpring(stiffness={"wrist": 1.0}, rest={"wrist": (0, 0, 0, 0)}), "quaternion .* is no rotation"),
+        (Spring(part="foot", stiffness=1.0), "part 'foot' is unknown: known parts are .*'tip'"),
+        (Spring(part="tip", to="cap", stiffness=1.0), "'tip' and 'cap' are one rigid body"),
+        (Drag(part="foot", linear=1.0), "part 'foot' is unknown"),
+        (Drag(part="world", linear=1.0), "'world' does not move"),
+        (Drag(part="tip"), "drag without a coefficient does nothing: give 'linear'"),
     ],
 )
 def test_effects_that_do_not_fit_are_refused(tree, effect, message):
@@ -78,6 +104,17 @@ def test_effects_that_do_not_fit_are_refused(tree, effect, message):
         lambda: Rod(part="tip", length=1.0, lenght=2.0),
         lambda: JointDamping(coefficients={"elbow": -1.0}),
         lambda: JointDamping(coefficients={}),
+        lambda: JointSpring(stiffness={"elbow": -1.0}),
+        lambda: JointSpring(stiffness={"elbow": 1.0}, damping={"elbow": -1.0}),
+        lambda: JointSpring(stiffness={"elbow": 1.0}, rest={"elbow": float("nan")}),
+        lambda: JointSpring(stiffness={"elbow": 1.0}, rest={"elbow": (1.0, 0.0)}),
+        lambda: Spring(part="tip", stiffness=-1.0),
+        lambda: Spring(part="tip", stiffness=1.0, at=(0.0, float("nan"), 0.0)),
+        lambda: Spring(part="tip", stiffness=1.0, rest_length=-0.1),
+        lambda: Spring(part="tip", stiffness=1.0, damping=float("inf")),
+        lambda: Spring(part="tip"),
+        lambda: Drag(part="tip", linear=-0.1),
+        lambda: Drag(part="tip", linear=0.1, wind=(float("nan"), 0.0, 0.0)),
         lambda: Attachment(),
     ],
 )

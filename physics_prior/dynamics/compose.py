@@ -15,7 +15,6 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 
@@ -26,6 +25,12 @@ from physics_prior.model import Tree
 
 ROOM = "physics_prior.dynamics"
 GRAVITY = 3  # numbers at the head of the parameters
+FUNCTIONS = {
+    "apply": ("forces", "links, work, q, v, tau", "{}"),
+    "differentiate": ("differentiate_forces", "links, work, freedoms, composites, q, v, tau_q, tau_v", "{}"),
+    "energy": ("potential_energy", "links, work, q", "total += {}"),
+}
+"""By function of a CompiledForce: the function of the step that calls it, the arguments of both, and the line of a call."""
 
 
 def pack_parameters(tree: Tree, effects: Sequence[Effect]) -> np.ndarray:
@@ -45,36 +50,30 @@ def section(parameters: Array, index: int) -> Array:
 def step_source(effects: Sequence[Effect], constrained: bool, integrator: str) -> str:
     """The text of a scene's step module."""
     texts = {name: _text(name) for name in ("motion", f"integrators.{integrator}", "step")}
-    calls: list[str] = []
-    slopes: list[str] = []
     imports = ["from physics_prior.dynamics.compose import section"]
     names: dict[str, str] = {}
+    lines: dict[str, list[str]] = {each: [] for each in FUNCTIONS}
     compiled = [effect.compiled for effect in effects if effect.compiled is not None]
     for index, force in enumerate(compiled):
-        parts: tuple[tuple[Any, str, list[str]], ...] = (
-            (force.apply.py_func, "links, work, q, v, tau", calls),
-            (force.differentiate.py_func, "links, work, q, v, tau_q, tau_v", slopes),
-        )
-        for function, arguments, lines in parts:
+        for each, (_, arguments, line) in FUNCTIONS.items():
+            if getattr(force, each) is None:
+                continue
+            function = getattr(force, each).py_func
             # a user's effect stands outside the folders that key the cache: its own digest makes an edit miss
             digest = hashlib.sha256(Path(function.__code__.co_filename).read_bytes()).hexdigest()[:16]
             source_of = f"from {function.__module__} import {function.__name__}"
             if source_of not in names:
-                taken = sum(each.endswith(f" import {function.__name__}") for each in names)
+                taken = sum(other.endswith(f" import {function.__name__}") for other in names)
                 names[source_of] = f"{function.__name__}_{taken}" if taken else function.__name__
                 renamed = f" as {names[source_of]}" if taken else ""
                 imports.append(f"{source_of}{renamed}  # {digest}")
-            lines.append(f"    {names[source_of]}(section(parameters, {index}), {arguments})")
-    composed = "\n".join(imports)
-    if calls:
-        composed += (
-            "\n\n\n@kernel\ndef forces(parameters, links, work, q, v, tau):\n"
-            + "\n".join(calls)
-            + "\n\n\n@kernel\ndef differentiate_forces(parameters, links, work, q, v, tau_q, tau_v):\n"
-            + "\n".join(slopes)
-            + "\n"
-        )
-        texts["motion"] = _replace(texts["motion"], "effects", composed)
+            lines[each].append(line.format(f"{names[source_of]}(section(parameters, {index}), {arguments})"))
+    if compiled:
+        lines["energy"] = ["total = 0.0", *lines["energy"], "return total"]
+        heads = [f"@kernel\ndef {name}(parameters, {arguments}):\n    " for name, arguments, _ in FUNCTIONS.values()]
+        bodies = ["\n    ".join(own) for own in lines.values()]
+        parts = ["\n".join(imports), *(head + body for head, body in zip(heads, bodies, strict=True))]
+        texts["motion"] = _replace(texts["motion"], "effects", "\n\n\n".join(parts) + "\n")
     texts["motion"] = _replace(texts["motion"], "constraints", f"CONSTRAINED = {constrained}")
     return "\n\n".join(texts.values())
 

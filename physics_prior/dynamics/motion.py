@@ -26,7 +26,7 @@ from physics_prior.dynamics.mass_factor import factorize_mass, solve_mass
 from physics_prior.dynamics.memory import correction_sections, sections, tangent_sections
 from physics_prior.dynamics.projection import project
 from physics_prior.dynamics.types import Array
-from physics_prior.effects.none import differentiate_forces, forces  # scene: effects
+from physics_prior.effects.none import differentiate_forces, forces, potential_energy  # scene: effects
 
 CONSTRAINED = False  # scene: constraints
 
@@ -78,7 +78,7 @@ def differentiate(memory: Array, tangent: Array, q: Array, v: Array, step: float
         own = derivative[i]
         for j in range(2 * nv):
             own[j] = -own[j]
-    differentiate_forces(parameters, links, work, q, v, tau_q, tau_v)
+    differentiate_forces(parameters, links, work, freedoms, composites, q, v, tau_q, tau_v)
     factorize_mass(freedoms, M)
     solve_mass(freedoms, M, derivative)
     if CONSTRAINED:
@@ -92,6 +92,13 @@ def differentiate(memory: Array, tangent: Array, q: Array, v: Array, step: float
                 right[r, nv + j] += rows_v[r, j]
         multiply_columns(rows, right, answer, change)
         subtract_transposed_product(response, answer, derivative)
+
+
+@kernel
+def potential(memory: Array, q: Array) -> float:
+    """Return the potential energy of the effects at q, J; poses are up to date."""
+    links, work, _, _, _, _, _, parameters = sections(memory)
+    return potential_energy(parameters, links, work, q)
 
 
 @kernel

@@ -3,7 +3,7 @@
 import numpy as np
 
 from physics_prior import rotations
-from physics_prior.effects.effect import Anchor, PointPair
+from physics_prior.effects.effect import PointPair
 from physics_prior.model import JointKind, Tree
 
 REVOLUTE, PRISMATIC, SPHERICAL, FREE = (int(kind) for kind in JointKind if kind is not JointKind.FIXED)
@@ -117,20 +117,13 @@ def pair_records(tree: Tree, pairs: list[PointPair]) -> np.ndarray:
     first = 0
     for record, pair in zip(records, pairs, strict=True):
         rows = 1 if pair.length is not None else len(pair.directions)
-        link_a, record["point_a"], R = _on_link(tree, pair.a)
-        link_b, record["point_b"], _ = _on_link(tree, pair.b)
+        link_a, record["point_a"], R = pair.a.on_link(tree)
+        link_b, record["point_b"], _ = pair.b.on_link(tree)
         record["link_a"], record["link_b"], record["rows"], record["first"] = link_a, link_b, rows, first
         record["is_rod"], record["length"] = pair.length is not None, pair.length or 0.0
         record["directions"][: 3 * rows] = (pair.directions[:rows] @ R.T).ravel()
         first += rows
     return records
-
-
-def _on_link(tree: Tree, anchor: Anchor) -> tuple[int, np.ndarray, np.ndarray]:
-    """Link index, point in the link's frame and rotation part to link of an anchor."""
-    frame = tree.frame(anchor.part)
-    R = rotations.matrix_from_quaternion(frame.orientation)
-    return frame.link, frame.position + R @ anchor.point, R
 
 
 def _moved_links(tree: Tree, pairs: np.ndarray) -> set[int]:

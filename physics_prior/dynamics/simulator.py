@@ -82,6 +82,8 @@ class Simulator:
         self._frames: dict[str, tuple[int, np.ndarray, np.ndarray]] = {}
         self._still, self._vdot = np.zeros(self.nv), np.zeros(self.nv)
         self._tangent = np.zeros(0)
+        self._stores = any(effect.compiled is not None and effect.compiled.energy is not None for effect in effects)
+        self._posed = np.zeros(self.nq)
         self._check_inertia()
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray | None = None) -> np.ndarray:
@@ -169,6 +171,7 @@ class Simulator:
     def move(self, q: np.ndarray, v: np.ndarray) -> None:
         """Bring the kinematics up to date for ``pose``, ``velocity``, ``jacobian`` and ``energy``."""
         kinematics.move(self._links, self._work, q, v)
+        self._posed[:] = q
 
     def pose(self, part: str) -> tuple[np.ndarray, np.ndarray]:
         """Position (3,) m and rotation matrix (3, 3), part to world, of a part's frame; needs ``move``."""
@@ -208,8 +211,12 @@ class Simulator:
         return tau
 
     def energy(self) -> float:
-        """Kinetic energy plus potential energy in the uniform field, J, zero height at the world's origin; needs ``move``."""
-        return float(kinematics.energy(self._links, self._work, self._gravity))
+        """Kinetic energy plus that in the uniform field, J, zero height at the world's origin, plus that in the effects.
+
+        Needs ``move``.
+        """
+        stored = self.step.potential(self.memory.array, self._posed) if self._stores else 0.0
+        return float(kinematics.energy(self._links, self._work, self._gravity) + stored)
 
     def _frame(self, part: str) -> tuple[int, np.ndarray, np.ndarray]:
         """Link, position and rotation on it of a part; ModelError lists the known parts."""
@@ -268,7 +275,7 @@ class Simulator:
 
     @property
     def effort(self) -> np.ndarray:
-        """(nv,) generalized forces of the effects at the last ``acceleration`` or ``wrenches``."""
+        """(nv,) generalized forces of the effects at the last ``acceleration`` or ``wrenches``; no wrenches on parts."""
         return np.array(self.memory.spare[2])
 
     def tangent_array(self) -> np.ndarray:

@@ -7,7 +7,9 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from physics_prior.model import Tree
+from physics_prior import rotations
+from physics_prior.errors import ModelError
+from physics_prior.model import JointKind, Link, Tree
 
 
 @dataclass(frozen=True)
@@ -16,6 +18,12 @@ class Anchor:
 
     part: str
     point: np.ndarray
+
+    def on_link(self, tree: Tree) -> tuple[int, np.ndarray, np.ndarray]:
+        """Index of the part's link (-1: the world), the point (3,) in the link's frame, m, and the rotation part to link."""
+        frame = tree.frame(self.part)
+        R = rotations.matrix_from_quaternion(frame.orientation)
+        return frame.link, frame.position + R @ self.point, R
 
 
 @dataclass(frozen=True)
@@ -40,17 +48,21 @@ class PointPair:
 
 @dataclass(frozen=True)
 class CompiledForce:
-    """The two compiled functions of an effect that pushes: imported by name into the generated step.
+    """The compiled functions of an effect that pushes: imported by name into the generated step.
 
     Attributes:
         apply: ``apply(parameters, links, work, q, v, tau)`` adds generalized forces to tau (nv,), and wrenches on links to
             ``work[i].force`` and ``work[i].moment`` (world axes, about the link's origin); kinematics are up to date.
-        differentiate: ``differentiate(parameters, links, work, q, v, tau_q, tau_v)`` adds the derivatives of tau
-            (nv, nv) by the tangent of q and by v.
+        differentiate: ``differentiate(parameters, links, work, freedoms, composites, q, v, tau_q, tau_v)`` adds the
+            derivatives (nv, nv), by the tangent of q and by v, of tau and of what its wrenches add to that;
+            ``dynamics/point_force.py`` has what wrenches need.
+        energy: ``energy(parameters, links, work, q)`` returns the potential energy, J, whose negative gradient the force
+            without damping is; None where there is none. Poses are up to date.
     """
 
     apply: Any
     differentiate: Any
+    energy: Any = None
 
 
 class Effect(BaseModel):
@@ -60,7 +72,7 @@ class Effect(BaseModel):
     force), ``point_pairs`` (equality rows).
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, allow_inf_nan=False)
 
     kind: ClassVar[str]
     """The key that names this effect in a scene file."""
@@ -91,3 +103,15 @@ class Effect(BaseModel):
     def point_pairs(self, tree: Tree) -> Sequence[PointPair]:
         """Equality rows; empty for effects that only push."""
         return ()
+
+
+def inner_joint(tree: Tree, joint: str, effect: str) -> Link:
+    """The link that a revolute, prismatic or spherical joint carries, for an effect that acts in joints.
+
+    Raises:
+        ModelError: an unknown joint, a fixed one, or a free one, which has nothing to act between.
+    """
+    link = tree.link(joint)
+    if link.joint.kind is JointKind.FREE:
+        raise ModelError(f"joint '{joint}' is free: {effect} acts in revolute, prismatic and spherical joints")
+    return link

@@ -7,9 +7,8 @@ from pydantic import Field
 
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.types import Array, Records
-from physics_prior.effects.effect import CompiledForce, Effect
-from physics_prior.errors import ModelError
-from physics_prior.model import JointKind, Tree
+from physics_prior.effects.effect import CompiledForce, Effect, inner_joint
+from physics_prior.model import Tree
 
 
 @kernel
@@ -21,7 +20,15 @@ def apply_joint_damping(parameters: Array, links: Records, work: Records, q: Arr
 
 @kernel
 def differentiate_joint_damping(
-    parameters: Array, links: Records, work: Records, q: Array, v: Array, tau_q: Array, tau_v: Array
+    parameters: Array,
+    links: Records,
+    work: Records,
+    freedoms: Records,
+    composites: Records,
+    q: Array,
+    v: Array,
+    tau_q: Array,
+    tau_v: Array,
 ) -> None:
     """Add d tau_k / d v_k = -d_k."""
     for k in range(v.shape[0]):
@@ -40,10 +47,7 @@ class JointDamping(Effect):
 
     def check(self, tree: Tree) -> None:
         for joint in self.coefficients:
-            if tree.link(joint).joint.kind is JointKind.FREE:
-                raise ModelError(
-                    f"joint '{joint}' is free: joint damping acts in revolute, prismatic and spherical joints"
-                )
+            inner_joint(tree, joint, "joint damping")
 
     def explain(self, tree: Tree) -> str:
         return "joints resist their velocity: " + ", ".join(f"{j} {c:.3g}" for j, c in self.coefficients.items())

@@ -11,6 +11,20 @@ def forces(parameters: Array, links: Records, work: Records, q: Array, v: Array,
 
 @inline_kernel
 def differentiate_forces(
-    parameters: Array, links: Records, work: Records, q: Array, v: Array, tau_q: Array, tau_v: Array
+    parameters: Array,
+    links: Records,
+    work: Records,
+    freedoms: Records,
+    composites: Records,
+    q: Array,
+    v: Array,
+    tau_q: Array,
+    tau_v: Array,
 ) -> None:
     """Add nothing."""
+
+
+@inline_kernel
+def potential_energy(parameters: Array, links: Records, work: Records, q: Array) -> float:
+    """Nothing is stored."""
+    return 0.0

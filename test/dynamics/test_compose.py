@@ -29,7 +29,7 @@ def {name}(parameters, links, work, q, v, tau):
 
 
 @kernel
-def differentiate_{name}(parameters, links, work, q, v, tau_q, tau_v):
+def differentiate_{name}(parameters, links, work, freedoms, composites, q, v, tau_q, tau_v):
     pass
 
 
@@ -84,7 +84,7 @@ def test_step_is_motion_integrator_and_step_in_one_module(integrator):
 def test_step_names_its_effects_only():
     text = step_source([Gravity(), JointDamping(coefficients={"elbow": 1.0})], False, "rk4")
     assert "apply_joint_damping(section(parameters, 0), links, work, q, v, tau)" in text
-    assert "differentiate_joint_damping(section(parameters, 0), links, work, q, v, tau_q, tau_v)" in text
+    assert "differentiate_joint_damping(section(parameters, 0), links, work, freedoms, composites, q, v," in text
     assert "effects.none" not in text
     assert text.count("physics_prior.effects") == 2
     assert not any(line.endswith((" scene: effects", " scene: constraints")) for line in text.splitlines())

@@ -213,7 +213,7 @@ class Simulator:
     def energy(self) -> float:
         """Kinetic energy plus that in the uniform field, J, zero height at the world's origin, plus that in the effects.
 
-        Needs ``move``.
+        Needs ``move``, or ``wrench_array``.
         """
         stored = self.step.potential(self.memory.array, self._posed) if self._stores else 0.0
         return float(kinematics.energy(self._links, self._work, self._gravity) + stored)
@@ -237,6 +237,7 @@ class Simulator:
             SimulationError: as ``acceleration``.
         """
         out = np.zeros((len(self.wrench_names), 6))
+        self._posed[:] = q
         count = len(self._links)
         if vdot is None:
             self._evaluate(q, v, self._still, self._vdot)

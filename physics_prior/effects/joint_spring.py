@@ -117,7 +117,13 @@ class JointSpring(Effect):
             self._rest(tree.link(joint))
 
     def explain(self, tree: Tree) -> str:
-        return "pulls joints to rest: " + ", ".join(f"{joint} {k:.3g}" for joint, k in self.stiffness.items())
+        terms = []
+        for joint, stiffness in self.stiffness.items():
+            slides = tree.link(joint).joint.kind is JointKind.PRISMATIC
+            damping = self.damping.get(joint, 0.0)
+            damped = f" with {damping:.3g} {'N s/m' if slides else 'N m s/rad'}" if damping else ""
+            terms.append(f"{joint} {stiffness:.3g} {'N/m' if slides else 'N m/rad'}{damped}")
+        return "pulls joints to rest: " + ", ".join(terms)
 
     def parameters(self, tree: Tree) -> np.ndarray:
         index = {link.joint.name: i for i, link in enumerate(tree.links)}

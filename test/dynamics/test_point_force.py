@@ -67,6 +67,21 @@ def test_derivatives_of_accelerations(random_tree, random_state, seed):
     assert off(np.hstack(simulator.acceleration_derivatives(q, v)), expected) < 2e-9  # measured 9e-11
 
 
+def test_drag_at_rest_in_still_air_is_smooth(random_tree, random_state):
+    """Its quadratic part has neither force nor slope there."""
+    rng = np.random.default_rng(20)
+    tree = random_tree(rng, size=4)
+    q, still = random_state(rng, tree)[0], np.zeros(tree.nv)
+    pull = springs(rng, tree, 3.0)
+    accelerations, slopes = [], []
+    for quadratic in (0.0, 0.7):
+        simulator = Simulator(tree, [*pull, Drag(part=tree.links[-1].part, linear=0.5, quadratic=quadratic)])
+        accelerations.append(simulator.acceleration(q, still))
+        slopes.append(np.hstack(simulator.acceleration_derivatives(q, still)))
+    assert np.array_equal(*accelerations)
+    assert np.array_equal(*slopes)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_springs_pull_down_the_gradient_of_their_energy(random_tree, random_state, seed):
     rng = np.random.default_rng(seed)

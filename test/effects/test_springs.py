@@ -83,6 +83,25 @@ def test_springs_keep_the_energy(arm):
     assert worst < 1e-9 * kinetic  # measured 2e-11
 
 
+def test_energy_is_that_of_the_state_last_seen(arm):
+    """Readouts ask for it after ``move``, or after ``wrench_array`` where they read forces too."""
+    simulator = Simulator(arm, all_springs(0.0))
+    q, v = start(arm)
+    expected = total_energy(simulator, q, v)
+    for vdot in (None, np.zeros(arm.nv)):
+        assert total_energy(simulator, arm.neutral(), 0.0 * v) != expected
+        simulator.wrench_array(q, v, vdot)
+        assert simulator.energy() == pytest.approx(expected, rel=1e-14)
+
+
+def test_a_joint_bears_what_a_spring_does_not(ball_and_cart):
+    """The rail carries the cart's weight less the 45 N with which a spring pulls it up."""
+    spring = {"part": "cart", "at": (0.0, 0.0, 2.0), "stiffness": 30.0, "rest_length": 0.5}
+    simulator = Simulator(ball_and_cart, [Gravity(acceleration=(0.0, 0.0, -9.81)), *springs(first=spring)])
+    wrench = simulator.wrenches(ball_and_cart.neutral(), np.zeros(7))["rail"]
+    assert np.allclose(wrench.force, [0.0, 0.0, 9.81 * BODY.mass - 45.0], rtol=1e-14)
+
+
 def test_dampers_only_take_energy(arm):
     simulator = Simulator(arm, [Gravity(), *all_springs(5.0)])
     q, v = start(arm)

@@ -1,0 +1,1 @@
+"""Inequalities: contact, friction and joint limits."""

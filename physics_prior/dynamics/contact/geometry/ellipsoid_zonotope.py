@@ -27,13 +27,24 @@ from physics_prior.dynamics.types import Array, Matrix, Symmetric, Vector
 _ITERATIONS = 50
 _HALVINGS = 40
 _ARMIJO = 1e-4
+_MARGIN = 0.1  # of a coordinate's range: the widest strip along a bound that counts as on it
 _NOISE = 1e-15  # of the sizes: what a distance may seem to rise by rounding
 
 
 @inline_kernel
-def _is_held(y: float, slope: float, column: Vector) -> bool:
-    """Whether a coordinate stays where it is: at a bound that the distance falls towards, or without a column."""
-    return (y >= 1.0 and slope <= 0.0) or (y <= -1.0 and slope >= 0.0) or dot(column, column) == 0.0
+def _to_bound(y: float, slope: float, margin: float) -> float:
+    """The way to the bound that a coordinate is within a margin of and that the distance falls towards; else infinity."""
+    if y >= 1.0 - margin and slope <= 0.0:
+        return 1.0 - y
+    if y <= margin - 1.0 and slope >= 0.0:
+        return -1.0 - y
+    return math.inf
+
+
+@inline_kernel
+def _still_to_go(y: float, slope: float, length: float) -> float:
+    """How far a step down the slope would take a coordinate, within its bounds."""
+    return abs(clamp(y - slope / length, 1.0) - y) if length > 0.0 else 0.0
 
 
 @inline_kernel
@@ -66,12 +77,13 @@ def _curvature(semi: Vector, columns: Matrix, normal: Vector, t: float, g: Vecto
 
 
 @inline_kernel
-def _newton_step(H: Symmetric, slopes: Vector, held: tuple[bool, bool, bool], scale: float) -> Vector:
-    """The Newton step of the coordinates that are not held, for the square of (distance + a constant) = scale.
+def _newton_step(H: Symmetric, slopes: Vector, bounds: Vector, scale: float) -> Vector:
+    """The Newton step for the square of (distance + a constant) = scale, where a coordinate's way to its bound is infinite.
 
-    It has the same minimum, and a slope along the normal too: (H + slopes slopes^T / scale) step = -slopes.
+    It has the same minimum, and a slope along the normal too: (H + slopes slopes^T / scale) step = -slopes. The other
+    coordinates go to their bounds (Bertsekas 1982).
     """
-    a, b, c = held
+    a, b, c = bounds[0] < math.inf, bounds[1] < math.inf, bounds[2] < math.inf
     x, y, z = slopes
     matrix = (
         1.0 if a else H[0] + x * x / scale,
@@ -81,7 +93,7 @@ def _newton_step(H: Symmetric, slopes: Vector, held: tuple[bool, bool, bool], sc
         0.0 if b or c else H[4] + y * z / scale,
         1.0 if c else H[5] + z * z / scale,
     )
-    right = 0.0 if a else -x, 0.0 if b else -y, 0.0 if c else -z
+    right = bounds[0] if a else -x, bounds[1] if b else -y, bounds[2] if c else -z
     return symmetric_times(symmetric_inverse(matrix), right)
 
 
@@ -98,17 +110,24 @@ def deepest_point(semi: Vector, center: Vector, columns: Matrix) -> tuple[float,
     It begins at the core's point nearest to the ellipsoid's centre. Armijo's rule along the projected path.
     """
     u, v, w = column(columns, 0), column(columns, 1), column(columns, 2)
-    size = length(u) + length(v) + length(w) + length(semi)
+    sizes = length(u), length(v), length(w)
+    size = sizes[0] + sizes[1] + sizes[2] + length(semi)
     least_scale = 2.0 * min(semi[0], min(semi[1], semi[2]))  # no point is deeper than half of this
     y = _start(u, center), _start(v, center), _start(w, center)
     x = plus(center, times(columns, y))
     distance, normal, t, g = signed_distance(semi, x)
     for _ in range(_ITERATIONS):
         slopes = transposed_times(columns, normal)
-        held = _is_held(y[0], slopes[0], u), _is_held(y[1], slopes[1], v), _is_held(y[2], slopes[2], w)
-        if held[0] and held[1] and held[2]:
+        to_go = _still_to_go(y[0], slopes[0], sizes[0]), _still_to_go(y[1], slopes[1], sizes[1])
+        margin = min(_MARGIN, max(max(to_go[0], to_go[1]), _still_to_go(y[2], slopes[2], sizes[2])))
+        bounds = (
+            _to_bound(y[0], slopes[0], margin) if sizes[0] > 0.0 else 0.0,
+            _to_bound(y[1], slopes[1], margin) if sizes[1] > 0.0 else 0.0,
+            _to_bound(y[2], slopes[2], margin) if sizes[2] > 0.0 else 0.0,
+        )
+        if bounds[0] == 0.0 and bounds[1] == 0.0 and bounds[2] == 0.0:
             break
-        step = _newton_step(_curvature(semi, columns, normal, t, g), slopes, held, distance + least_scale)
+        step = _newton_step(_curvature(semi, columns, normal, t, g), slopes, bounds, distance + least_scale)
         moved = math.inf
         for _ in range(_HALVINGS):
             trial = clamp(y[0] + step[0], 1.0), clamp(y[1] + step[1], 1.0), clamp(y[2] + step[2], 1.0)

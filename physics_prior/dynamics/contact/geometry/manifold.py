@@ -10,7 +10,7 @@ ROW = 10
 """Point on a (3), point on b (3), normal (3), gap."""
 ROUNDING = 1e-12
 """What counts as nothing, relative to the sizes of the shapes."""
-SMALL_STEP = 1e-9
+SMALL_STEP = 1e-11
 """The last step of a Newton method, relative: what is left after it is of the order of its square."""
 FLAT = 0.999
 """Cosine between the nearest pair's normal and a face's beyond which the shapes lie on that face."""

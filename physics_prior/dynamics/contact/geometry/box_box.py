@@ -123,7 +123,7 @@ def nearest_features(half_a: Vector, half_b: Vector, center: Vector, R: Matrix) 
     return on_a, on_b
 
 
-@inline_kernel
+@kernel
 def _faces(
     which: int,
     normal: Vector,
@@ -168,7 +168,7 @@ def box_box(
         middle_a, along_a = _edge(half_a, edge_a, normal)
         middle_b, along_b = _edge(half_b, edge_b, scale(-1.0, transposed_times(R, normal)))
         on_a, on_b = nearest_points(middle_a, along_a, plus(center, times(R, middle_b)), times(R, along_b))
-        found = edge <= 0.0 or length(minus(on_b, on_a)) <= edge + tolerance
+        found = edge <= tolerance or length(minus(on_b, on_a)) <= edge + tolerance
     else:
         normal = axis_vector(which, sign(center[which])) if which < 3 else column(R, which - 3)
         normal = scale(sign(dot(normal, center)), normal)
@@ -179,7 +179,7 @@ def box_box(
             return rows
         on_b = plus(center, times(R, _corner(half_b, scale(-1.0, transposed_times(R, normal)))))
         on_a = minus(on_b, scale(face, normal))
-        found = face <= 0.0
+        found = face <= tolerance
     if not found:
         on_a, on_b = nearest_features(half_a, half_b, center, R)
         normal = minus(on_b, on_a)

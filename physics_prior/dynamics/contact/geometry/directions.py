@@ -32,6 +32,12 @@ def length(u: Vector) -> float:
 
 
 @inline_kernel
+def stretched(semi: Vector, u: Vector) -> Vector:
+    """The vector u stretched along the axes, component by component."""
+    return semi[0] * u[0], semi[1] * u[1], semi[2] * u[2]
+
+
+@inline_kernel
 def sign(x: float) -> float:
     """1 or -1; zero counts as positive."""
     return 1.0 if x >= 0.0 else -1.0

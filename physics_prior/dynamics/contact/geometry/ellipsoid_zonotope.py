@@ -17,7 +17,7 @@ from physics_prior.dynamics.algebra import (
     times,
     transposed_times,
 )
-from physics_prior.dynamics.contact.geometry.directions import clamp, column, length, sign, transposed
+from physics_prior.dynamics.contact.geometry.directions import clamp, column, length, sign, stretched, transposed
 from physics_prior.dynamics.contact.geometry.manifold import SMALL_STEP, write_round_row
 from physics_prior.dynamics.contact.geometry.plane import ellipsoid_support
 from physics_prior.dynamics.contact.geometry.point_ellipsoid import signed_distance
@@ -53,17 +53,15 @@ def _curvature(semi: Vector, columns: Matrix, normal: Vector, t: float, g: Vecto
 
     From g = D x and |A g| = 1: dx moves t by dt = (g . A^2 D dx) / (g . A^2 D g), and dn = P (D dx - D g dt) / |g|.
     """
-    square = semi[0] * semi[0], semi[1] * semi[1], semi[2] * semi[2]
+    square = stretched(semi, semi)
     D = 1.0 / (square[0] + t), 1.0 / (square[1] + t), 1.0 / (square[2] + t)
-    pull = D[0] * g[0], D[1] * g[1], D[2] * g[2]
-    weight = t / (pull[0] * square[0] * g[0] + pull[1] * square[1] * g[1] + pull[2] * square[2] * g[2])
+    pull = stretched(D, g)
+    weight = t / dot(pull, stretched(square, g))
     u, v, w = column(columns, 0), column(columns, 1), column(columns, 2)
     u = minus(u, scale(dot(normal, u), normal))
     v = minus(v, scale(dot(normal, v), normal))
     w = minus(w, scale(dot(normal, w), normal))
-    Du = D[0] * u[0], D[1] * u[1], D[2] * u[2]
-    Dv = D[0] * v[0], D[1] * v[1], D[2] * v[2]
-    Dw = D[0] * w[0], D[1] * w[1], D[2] * w[2]
+    Du, Dv, Dw = stretched(D, u), stretched(D, v), stretched(D, w)
     gu, gv, gw = dot(pull, u), dot(pull, v), dot(pull, w)
     s = 1.0 / dot(g, normal)
     return (
@@ -175,8 +173,7 @@ def ellipsoid_box(
     best, face, normal = -math.inf, 0, (0.0, 0.0, 1.0)
     for k in range(3):
         outward = scale(sign(seen[k]), column(R, k))
-        stretched = semi[0] * outward[0], semi[1] * outward[1], semi[2] * outward[2]
-        separation = abs(seen[k]) - half[k] - length(stretched)
+        separation = abs(seen[k]) - half[k] - length(stretched(semi, outward))
         if separation > best:
             best, face, normal = separation, k, scale(-1.0, outward)
     on_a = ellipsoid_support(semi, normal)

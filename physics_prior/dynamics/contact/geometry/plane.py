@@ -3,7 +3,7 @@
 import math
 
 from physics_prior.dynamics.algebra import dot, minus, plus, scale, times, transposed_times
-from physics_prior.dynamics.contact.geometry.directions import column
+from physics_prior.dynamics.contact.geometry.directions import column, length, stretched
 from physics_prior.dynamics.contact.geometry.manifold import write_row
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.types import Array, Matrix, Vector
@@ -64,9 +64,8 @@ def plane_box(
 @inline_kernel
 def ellipsoid_support(semi: Vector, direction: Vector) -> Vector:
     """The point of an ellipsoid that lies furthest along a unit direction, A^2 n / |A n|, in its own axes."""
-    stretched = semi[0] * direction[0], semi[1] * direction[1], semi[2] * direction[2]
-    reach = math.sqrt(dot(stretched, stretched))
-    return semi[0] * stretched[0] / reach, semi[1] * stretched[1] / reach, semi[2] * stretched[2] / reach
+    image = stretched(semi, direction)
+    return scale(1.0 / length(image), stretched(semi, image))
 
 
 @kernel

@@ -3,7 +3,7 @@
 import math
 
 from physics_prior.dynamics.algebra import dot, scale
-from physics_prior.dynamics.contact.geometry.directions import length, sign
+from physics_prior.dynamics.contact.geometry.directions import length, sign, stretched
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.types import Vector
 
@@ -25,7 +25,7 @@ def signed_distance(semi: Vector, point: Vector) -> tuple[float, Vector, float, 
     by Newton's method on 1 / |a g|, which is almost straight; it climbs from below.
     """
     x = _off_center(point[0], semi[0]), _off_center(point[1], semi[1]), _off_center(point[2], semi[2])
-    square = semi[0] * semi[0], semi[1] * semi[1], semi[2] * semi[2]
+    square = stretched(semi, semi)
     base = min(square[0], min(square[1], square[2]))
     rest = square[0] - base, square[1] - base, square[2] - base
     u = max(semi[0] * abs(x[0]) - rest[0], max(semi[1] * abs(x[1]) - rest[1], semi[2] * abs(x[2]) - rest[2]))

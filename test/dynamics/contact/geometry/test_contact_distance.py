@@ -72,7 +72,7 @@ def test_no_direction_leaves_a_shallow_overlap_sooner(kind_a, kind_b, geometry):
     shell = rng.normal(size=(300, 3))
     worst, worst_dual = 0.0, 0.0
     for _ in range(8):
-        a, b = geometry.random_pair(rng, kind_a, kind_b, -rng.uniform(0.0, 0.01))
+        a, b = geometry.random_pair(rng, kind_a, kind_b, -rng.uniform(0.0, 0.05))
         row = geometry.nearest(a, b)
         normals = np.vstack([shell, row[6:9] + 0.1 * rng.normal(size=(30, 3))])
 

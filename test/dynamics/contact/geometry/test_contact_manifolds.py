@@ -130,3 +130,12 @@ def test_anything_gives_finite_rows(geometry, kind_a, kind_b, size_a, size_b, at
     assert 1 <= len(rows) <= 8
     assert np.all(np.isfinite(rows))
     assert np.max(np.abs(np.linalg.norm(rows[:, 6:9], axis=1) - 1.0)) < 1e-12
+
+
+def test_needles_of_any_size_do_not_lose_their_reach_to_rounding(geometry, shape):
+    """n . B n by the entries of B, whose condition is 1e20 here, would be negative."""
+    needle = shape(ELLIPSOID, (0.46, 1.3e-3, 32.0), (-0.09, -1.3, 2.3))
+    rng = np.random.default_rng(4)
+    for _ in range(50):
+        rows = geometry.manifold(needle, shape(ELLIPSOID, (7.2e4, 2e-3, 1.4e7), turn=rng.normal(size=3)))
+        assert np.all(np.isfinite(rows))

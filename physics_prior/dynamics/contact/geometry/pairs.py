@@ -52,9 +52,9 @@ def touch(
     A row is a point on a (3), a point on b (3), the unit normal from a to b (3) and the gap = normal . (b - a), negative
     where they overlap; world axes, m. Rows have gaps of at most `reach`, but the nearest pair is always there, and its gap
     is the shapes' signed distance: their distance apart, or minus the least depth by which a shallow overlap is left.
-    A plane is only ever shape a. Nothing is allocated, and the same arguments give the same bits.
+    One of them may be a plane. Nothing is allocated, and the same arguments give the same bits.
     """
-    if kind_a != PLANE and kind_a < kind_b:
+    if kind_b == PLANE or (kind_a != PLANE and kind_a < kind_b):
         rows = _touch_in_order(kind_b, size_b, center_b, R_b, kind_a, size_a, center_a, R_a, reach, out)
         exchange(out, rows)
         return rows

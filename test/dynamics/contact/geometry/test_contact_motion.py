@@ -15,12 +15,12 @@ kinds = st.sampled_from(CURVED)
 gaps = st.one_of(st.floats(-0.01, 1.0), st.just(0.0))
 
 
-@given(kinds, kinds, gaps, seeds)
+@given(st.sampled_from((PLANE, *CURVED)), kinds, gaps, seeds)
 @settings(max_examples=60, deadline=None)
 def test_either_shape_may_be_first(geometry, kind_a, kind_b, gap, seed):
     a, b = geometry.random_pair(np.random.default_rng(seed), kind_a, kind_b, gap)
     there, back = geometry.manifold(a, b, 0.5), geometry.manifold(b, a, 0.5)
-    assert abs(np.min(there[:, 9]) - np.min(back[:, 9])) < 1e-12  # measured 2e-15
+    assert abs(np.min(there[:, 9]) - np.min(back[:, 9])) < 1e-12  # measured 1e-15
     if kind_a != kind_b:
         assert np.array_equal(there[:, :3], back[:, 3:6])
         assert np.array_equal(there[:, 6:9], -back[:, 6:9])
@@ -37,9 +37,9 @@ def test_moved_together_nothing_changes(geometry, kind_a, kind_b, gap, seed):
         return geometry.Shape(s.kind, s.size, R @ s.center + shift, R @ s.R)
 
     here, there = geometry.nearest(a, b), geometry.nearest(move(a), move(b))
-    assert abs(here[9] - there[9]) < 1e-12  # measured 3e-15
+    assert abs(here[9] - there[9]) < 1e-12  # measured 4e-15
     if gap > 1e-3:  # a face and an edge may be equally deep
-        assert np.max(np.abs(R @ here[6:9] - there[6:9])) < 1e-10  # measured 2e-13
+        assert np.max(np.abs(R @ here[6:9] - there[6:9])) < 1e-10  # measured 3e-15
 
 
 def motion(rng, size=1.0):

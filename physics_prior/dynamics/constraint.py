@@ -4,7 +4,8 @@ Unit forces of all rows run once through the articulated-body factors: Y = their
 A M^-1 A^T = Y Z^T without A or M ever being formed. Redundant rows leave it singular; the solve is proximal (Carpentier
 2021): regularised by 1e-10 of the mean diagonal and refined, so that motion is exact and multipliers are those of least
 norm. ``rows`` is one array (m + 3, 2 w + 2 m): Y | Z | A M^-1 A^T | its Cholesky factor, and below them right side, answer
-and change; w counts the degrees of freedom that the rows move. A row d . (b - a), d fixed on link a, sees b move against link
+and change; w counts the degrees of freedom that the rows move. The directions of a pair that is not active are zero, and with
+them all its rows. A row d . (b - a), d fixed on link a, sees b move against link
 a's own point at b: so both forces act at b. The two of a rod act at its ends.
 """
 
@@ -61,7 +62,9 @@ def place(work: Records, pairs: Records) -> None:
         put3(pair.hold, a if pair.is_rod else b)
         for row in range(pair.rows):
             d = (pair.directions[3 * row], pair.directions[3 * row + 1], pair.directions[3 * row + 2])
-            if pair.is_rod:
+            if not pair.active:
+                d = ZERO
+            elif pair.is_rod:
                 gap = minus(b, a)
                 d = scale(1.0 / math.sqrt(dot(gap, gap)), gap)
             elif pair.link_a >= 0:
@@ -92,7 +95,7 @@ def position_error(pairs: Records, out: Array) -> float:
         gap = minus(get3(pair.a), get3(pair.b))
         for row in range(pair.rows):
             error = dot(direction(pair, row), gap)
-            if pair.is_rod:
+            if pair.is_rod and pair.active:
                 error += pair.length
             out[pair.first + row] = error
             worst = max(worst, abs(error))
@@ -101,12 +104,14 @@ def position_error(pairs: Records, out: Array) -> float:
 
 @inline_kernel
 def approach(work: Records, pair: Record) -> Vector:
-    """Velocity of point b less that of link a where the force holds it, m/s."""
+    """Velocity of point b less that of link a where the force holds it, or of a moving anchor, m/s."""
     rate = ZERO
     if pair.link_b >= 0:
         rate = point_velocity(work[pair.link_b], get3(pair.b))
     if pair.link_a >= 0:
         rate = minus(rate, point_velocity(work[pair.link_a], get3(pair.hold)))
+    elif pair.motion > 0:
+        rate = minus(rate, get3(pair.drift))
     return rate
 
 
@@ -133,6 +138,8 @@ def relative_acceleration(work: Records, pair: Record, gravity: Array) -> Vector
             between = minus(between, scale(2.0, cross(get3(on.omega), approach(work, pair))))
     else:
         between = plus(between, (gravity[0], gravity[1], gravity[2]))
+        if pair.motion > 0:
+            between = minus(between, get3(pair.drift_rate))
     return between
 
 
@@ -144,7 +151,7 @@ def acceleration_error(work: Records, pairs: Records, gravity: Array, out: Array
         between = relative_acceleration(work, pair, gravity)
         for row in range(pair.rows):
             error = dot(direction(pair, row), between)
-            if pair.is_rod:
+            if pair.is_rod and pair.active:
                 rate = approach(work, pair)
                 along = dot(direction(pair, row), rate)
                 gap = minus(get3(pair.b), get3(pair.a))
@@ -172,16 +179,18 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: 
     than POSITION_TOLERANCE, however nearly singular the rows are (a mechanism that folds).
     The factor is L D L^T with unit L, here also above the diagonal, in which stands D inverted.
     """
-    m, w = row_count(rows), width(rows)
+    m, w, active = row_count(rows), width(rows), 0
     for p in range(pairs.shape[0]):
         pair = pairs[p]
         first, last = pair.first, pair.first + pair.rows
         for r in range(first, last):
             for k in range(2 * w):
                 rows[r, k] = 0.0
-        y, z, d = rows[first:last, :w], rows[first:last, w : 2 * w], get9(pair.d)
-        push(links, work, pair.link_b, get3(pair.b), d, pair.rows, y, z)
-        push(links, work, pair.link_a, get3(pair.hold), minus9(d), pair.rows, y, z)
+        if pair.active:
+            y, z, d = rows[first:last, :w], rows[first:last, w : 2 * w], get9(pair.d)
+            push(links, work, pair.link_b, get3(pair.b), d, pair.rows, y, z)
+            push(links, work, pair.link_a, get3(pair.hold), minus9(d), pair.rows, y, z)
+            active += pair.rows
     trace = 0.0
     for r in range(m):
         one = rows[r, :w]
@@ -192,28 +201,31 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: 
             rows[r, 2 * w + s] = total
             rows[s, 2 * w + r] = total
         trace += rows[r, 2 * w + r]
-    epsilon = REGULARISATION * trace / m
+    epsilon = REGULARISATION * trace / active if trace > 0.0 else 1.0
     rank, least = 0, math.inf
     S, L = rows[:, 2 * w : 2 * w + m], rows[:, 2 * w + m : 2 * w + 2 * m]
     for r in range(m):
         for s in range(r, m):
             L[r, s] = S[r, s]
         L[r, r] += epsilon
-    for r in range(m):
-        pivot = L[r, r]
-        if pivot > DEPENDENT * epsilon:
-            rank += 1
-        pivot = max(pivot, 1e-3 * epsilon)
-        least = min(least, pivot)
-        inverse = 1.0 / pivot
-        L[r, r] = inverse
-        for s in range(r + 1, m):
-            factor = L[r, s] * inverse
-            for k in range(s, m):
-                L[s, k] -= factor * L[r, k]
-            L[s, r] = factor
-        for s in range(r + 1, m):
-            L[r, s] = L[s, r]
+    for p in range(pairs.shape[0]):
+        pair = pairs[p]
+        for r in range(pair.first, pair.first + pair.rows):
+            pivot = L[r, r]
+            if pivot > DEPENDENT * epsilon:
+                rank += 1
+            pivot = max(pivot, 1e-3 * epsilon)
+            if pair.active:
+                least = min(least, pivot)
+            inverse = 1.0 / pivot
+            L[r, r] = inverse
+            for s in range(r + 1, m):
+                factor = L[r, s] * inverse
+                for k in range(s, m):
+                    L[s, k] -= factor * L[r, k]
+                L[s, r] = factor
+            for s in range(r + 1, m):
+                L[r, s] = L[s, r]
     known[-2] = rank
     known[-1] = max(POSITION_TOLERANCE * math.sqrt(least * REGULARISATION / epsilon), ROUNDING)
 

@@ -150,6 +150,11 @@ def differentiate_rows(
     nv = gaps.shape[0]
     for p in range(pairs.shape[0]):
         pair = pairs[p]
+        if not pair.active:
+            for r in range(pair.first, pair.first + pair.rows):
+                for k in range(nv):
+                    A[r, k], A_q[r, k], rows_q[r, k], rows_v[r, k] = 0.0, 0.0, 0.0, 0.0
+            continue
         differentiate_gap(links, work, freedom_records, composites, pair, gaps)
         rate, acceleration = approach(work, pair), relative_acceleration(work, pair, gravity)
         between = minus(get3(pair.b), get3(pair.a))

@@ -7,6 +7,7 @@ effects that the scene names and nothing else. ``memory`` is that of memory.py.
 
 import math
 
+from physics_prior.dynamics.anchor_motion import move_anchors
 from physics_prior.dynamics.arrays import add_product, clear, copy, subtract_transposed_product
 from physics_prior.dynamics.articulated_body import accelerate, factorize
 from physics_prior.dynamics.constraint import (
@@ -23,7 +24,7 @@ from physics_prior.dynamics.gyroscopic import take_at_middle
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kinematics import flow, pose, weigh
 from physics_prior.dynamics.mass_factor import factorize_mass, solve_mass
-from physics_prior.dynamics.memory import correction_sections, sections, tangent_sections
+from physics_prior.dynamics.memory import TIME, correction_sections, sections, tangent_sections
 from physics_prior.dynamics.projection import project
 from physics_prior.dynamics.types import Array
 from physics_prior.effects.none import differentiate_forces, forces, potential_energy  # scene: effects
@@ -41,6 +42,7 @@ def evaluate(memory: Array, q: Array, v: Array, extra: Array, step: float, vdot:
     gravity, tau = parameters[:3], spare[2]
     rank = 0
     if CONSTRAINED:
+        move_anchors(work, pairs, parameters, memory[TIME])
         rank = refresh(links, work, pairs, rows, known, q)
     else:
         pose(links, work, q)
@@ -110,19 +112,25 @@ def differentiate_acceleration(memory: Array, tangent: Array, q: Array, v: Array
 
 
 @kernel
-def project_columns(memory: Array, A: Array, A_q: Array, columns: Array, scratch: Array) -> None:
+def project_columns(memory: Array, A: Array, A_q: Array, columns: Array, scratch: Array, as_caught: bool) -> None:
     """Put the columns (2 nv, k) of errors of q and v onto the constraints' tangent space, in the mass metric.
 
-    A dq = 0 and A dv + d(A v)/dq dq = 0: the covariance then has no mass in forbidden directions. Needs ``refresh``, and
-    scratch of ``correction_size``.
+    A dq = 0 and A dv + d(A v)/dq dq = 0: the covariance then has no mass in forbidden directions. With as_caught, errors
+    keep their A dq in pairs that took hold where the part was: their anchor is as far off as the state was then. Needs
+    ``refresh``, and scratch of ``correction_size``.
     """
-    links, work, _, rows, _, _, spare, _ = sections(memory)
+    links, work, pairs, rows, _, _, spare, _ = sections(memory)
     m, nv = A.shape
     by_q, by_v = columns[:nv], columns[nv:]
     response, right, answer, change = correction_sections(scratch, m, nv, columns.shape[1])
     responses(links, work, rows, spare[0], response)
     clear(right)
     add_product(A, by_q, right)
+    if as_caught:
+        for p in range(pairs.shape[0]):
+            if pairs[p].here:
+                for r in range(pairs[p].first, pairs[p].first + pairs[p].rows):
+                    right[r, :] = 0.0
     multiply_columns(rows, right, answer, change)
     subtract_transposed_product(response, answer, by_q)
     clear(right)
@@ -138,6 +146,7 @@ def tangent_rows(memory: Array, tangent: Array, q: Array, v: Array, A: Array, A_
     links, work, pairs, rows, known, _, _, parameters = sections(memory)
     m, nv = row_count(rows), v.shape[0]
     derivative, matrices, _, freedoms, composites, gaps, _ = tangent_sections(tangent, links.shape[0], m, nv)
+    move_anchors(work, pairs, parameters, memory[TIME])
     refresh(links, work, pairs, rows, known, q)
     flow(links, work, v)
     sweep(links, work, parameters[:3], 0.0, freedoms, composites)
@@ -150,8 +159,9 @@ def tangent_rows(memory: Array, tangent: Array, q: Array, v: Array, A: Array, A_
 @kernel
 def settle(memory: Array, q: Array, v: Array) -> None:
     """Put q (nq,) and v (nv,) back onto the constraints, as every step ends; needs ``evaluate`` near q."""
-    links, work, pairs, rows, known, _, spare, _ = sections(memory)
+    links, work, pairs, rows, known, _, spare, parameters = sections(memory)
     if CONSTRAINED:
+        move_anchors(work, pairs, parameters, memory[TIME])
         project(links, work, pairs, rows, known, q, v, spare, POSITION_TOLERANCE)
 
 
@@ -165,8 +175,8 @@ def settle_tangent(memory: Array, tangent: Array, q: Array, v: Array, F: Array, 
         A, A_q = matrices[nv : nv + m], matrices[nv + m : nv + 2 * m]
         settle(memory, q, v)
         tangent_rows(memory, tangent, q, v, A, A_q)
-        project_columns(memory, A, A_q, F, scratch)
-        project_columns(memory, A, A_q, G, scratch)
+        project_columns(memory, A, A_q, F, scratch, True)
+        project_columns(memory, A, A_q, G, scratch, False)
 
 
 @kernel
@@ -191,4 +201,4 @@ def spread_noise(memory: Array, tangent: Array, force_noise: Array, h: float, G:
             G[nv + k, j] = far * columns[k, j]
             G[nv + k, nv + j] = late * columns[k, j]
     if CONSTRAINED:
-        project_columns(memory, matrices[nv : nv + m], matrices[nv + m : nv + 2 * m], G, scratch)
+        project_columns(memory, matrices[nv : nv + m], matrices[nv + m : nv + 2 * m], G, scratch, False)

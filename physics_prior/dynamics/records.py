@@ -71,10 +71,19 @@ PAIR = np.dtype(
         ("rows", "i8"),  # 1..3
         ("first", "i8"),  # its first row
         ("is_rod", "i8"),
+        ("active", "i8"),  # whether it holds now; if not, its rows do nothing
+        ("here", "i8"),  # whether it holds where it took hold: an error of position then is none of its rows
+        (
+            "motion",
+            "i8",
+        ),  # where in the step's parameters the motion of point a begins (anchor_motion.py); 0 if it has none
         ("length", "f8"),  # of a rod, m
         ("point_a", "f8", 3),  # in link a's frame, m
         ("point_b", "f8", 3),
         ("directions", "f8", 9),  # rows of unit vectors in link a's frame
+        ("base", "f8", 3),  # point a of a moving anchor where its motion displaces it by nothing, world, m
+        ("drift", "f8", 3),  # velocity of a moving anchor, world, m/s
+        ("drift_rate", "f8", 3),  # its acceleration, m/s^2
         ("a", "f8", 3),  # point a, world, m
         ("b", "f8", 3),
         ("hold", "f8", 3),  # where the force acts on link a: at b, but at a for a rod
@@ -121,9 +130,21 @@ def pair_records(tree: Tree, pairs: list[PointPair]) -> np.ndarray:
         link_b, record["point_b"], _ = pair.b.on_link(tree)
         record["link_a"], record["link_b"], record["rows"], record["first"] = link_a, link_b, rows, first
         record["is_rod"], record["length"] = pair.length is not None, pair.length or 0.0
+        record["active"], record["base"] = 1, record["point_a"]
         record["directions"][: 3 * rows] = (pair.directions[:rows] @ R.T).ravel()
         first += rows
     return records
+
+
+def motion_tables(tree: Tree, pairs: list[PointPair], records: np.ndarray, begin: int) -> np.ndarray:
+    """The tables of all moving anchors, in world axes, and in the records where each begins, the first of them at ``begin``."""
+    tables = [np.zeros(0)]
+    for record, pair in zip(records, pairs, strict=True):
+        if pair.motion is not None:
+            record["motion"] = begin + sum(map(len, tables))
+            R = rotations.matrix_from_quaternion(tree.frame(pair.a.part).orientation)
+            tables.append(pair.motion.table(R))
+    return np.concatenate(tables)
 
 
 def _moved_links(tree: Tree, pairs: np.ndarray) -> set[int]:

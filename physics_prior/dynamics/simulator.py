@@ -1,30 +1,22 @@
 """A model and its effects, compiled: the one object that moves a body, differentiates its motion and tells its forces."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from physics_prior import rotations
-from physics_prior.dynamics import constraint, kinematics, manifold, newton_euler, projection
+from physics_prior.dynamics import anchor_motion, constraint, kinematics, manifold, newton_euler, projection
 from physics_prior.dynamics.compose import GRAVITY, pack_parameters, step_module
 from physics_prior.dynamics.integrators import DEFAULT, INTEGRATORS, IntegratorName
 from physics_prior.dynamics.memory import SPARE, TIME, Memory, correction_size, tangent_size
-from physics_prior.dynamics.records import link_records, moved_freedoms, pair_records
+from physics_prior.dynamics.records import link_records, motion_tables, moved_freedoms, pair_records
+from physics_prior.dynamics.switches import Switches
+from physics_prior.dynamics.wrench import Wrench
 from physics_prior.effects.effect import Effect, PointPair
 from physics_prior.errors import ModelError, SimulationError
 from physics_prior.model import Tree
 
 SINGULAR = 1e-13  # least eigenvalue of the scaled mass matrix: below, a joint moves nothing
-
-
-@dataclass(frozen=True)
-class Wrench:
-    """A force and a moment, (3,) N and (3,) N m, ON a part BY a constraint, at a point (3,) m; all in world axes."""
-
-    force: np.ndarray
-    moment: np.ndarray
-    point: np.ndarray
 
 
 class Simulator:
@@ -36,6 +28,7 @@ class Simulator:
         tree, effects, integrator: what it was built from.
         nq, nv, rows: sizes of configuration, velocity and constraint rows.
         wrench_names: whose wrenches there are: moving joints, then effects that hold something.
+        switches: which of these hold now, and what happens when they take hold (switches.py).
         step, memory: the compiled step (compose.py) and the array it works in (memory.py).
         rank: rank of the constraint rows at the last evaluation (below ``rows`` where some are redundant: then the motion is
             unique, the split of forces is not).
@@ -52,23 +45,26 @@ class Simulator:
         self.tree, self.effects, self.integrator = tree, tuple(effects), integrator
         self._labels: list[tuple[str, int, int]] = []
         pairs: list[PointPair] = []
+        holding: list[Effect] = []
         for effect in effects:
             own = effect.point_pairs(tree)
             if own:
                 self._labels.append((effect.label, len(pairs), len(pairs) + len(own)))
                 pairs.extend(own)
+                holding.append(effect)
         self.wrench_names = [link.joint.name for link in tree.links] + [label for label, _, _ in self._labels]
         self.nq, self.nv = tree.nq, tree.nv
         self.rows = sum(1 if pair.length is not None else len(pair.directions) for pair in pairs)
         self.rank = 0
-        records = pair_records(tree, pairs)
+        records, parameters = pair_records(tree, pairs), pack_parameters(tree, effects)
+        tables = motion_tables(tree, pairs, records, len(parameters))
         needs = INTEGRATORS[integrator]
         self._tangent_size = tangent_size(len(tree.links), self.rows, self.nv, needs.stages)
         memory = Memory(
             link_records(tree, records),
             records,
             moved_freedoms(tree, records),
-            pack_parameters(tree, effects),
+            np.concatenate([parameters, tables]),
             self.nq,
             self.nv,
             SPARE + needs.vectors,
@@ -84,6 +80,7 @@ class Simulator:
         self._tangent = np.zeros(0)
         self._stores = any(effect.compiled is not None and effect.compiled.energy is not None for effect in effects)
         self._posed = np.zeros(self.nq)
+        self.switches = Switches(self, holding, [(first, last) for _, first, last in self._labels])
         self._check_inertia()
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray | None = None) -> np.ndarray:
@@ -137,8 +134,29 @@ class Simulator:
             return 0.0
         own = self.memory
         system = (own.links, own.work, own.pairs, own.rows, own.known, q)
+        self._move_anchors()
         constraint.refresh(*system)
         return float(projection.project(*system, v, own.spare, constraint.ROUNDING))
+
+    def switch(self, label: str, on: bool, q: np.ndarray, v: np.ndarray) -> dict[str, Wrench]:
+        """Have an effect take hold or let go at q and v, which are put in place onto all that holds then; return the impulses.
+
+        Raises:
+            ModelError: no effect of that name holds anything; SimulationError: it cannot take hold there.
+        """
+        self.switches.holds = self.switches.switched(self.switches.index(label), on, q)
+        return self.switches.take_hold(q, v) if on else {}
+
+    def begin(self, q: np.ndarray, v: np.ndarray) -> None:
+        """Begin the scene at q and v: time zero, and what holds then takes hold.
+
+        Raises:
+            SimulationError: it cannot.
+        """
+        self.time = 0.0
+        for index, effect in enumerate(self.switches.effects):
+            self.switches.holds = self.switches.switched(index, effect.active_at(0.0), q)
+        self.switches.take_hold(q, v)
 
     def displaced(self, q: np.ndarray, delta: np.ndarray) -> np.ndarray:
         """(nq,) q moved by a tangent vector (nv,), as Tree.integrate does, compiled."""
@@ -151,7 +169,7 @@ class Simulator:
         if self.rows:
             self.project(q, v)
             scratch = np.empty(correction_size(self.rows, self.nv, factor.shape[1]))
-            self.step.project_columns(self.memory.array, *self.tangent_rows(q, v), factor, scratch)
+            self.step.project_columns(self.memory.array, *self.tangent_rows(q, v), factor, scratch, True)
 
     def tangent_rows(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Constraint Jacobian A (rows, nv) and the derivative of A v by the tangent of q (rows, nv)."""
@@ -164,6 +182,7 @@ class Simulator:
         """(rows,) how far q is off the constraints, m."""
         out = np.zeros(self.rows)
         self.move(q, v)
+        self._move_anchors()
         constraint.place(self._work, self._pairs)
         constraint.position_error(self._pairs, out)
         return -out
@@ -296,6 +315,10 @@ class Simulator:
                 f"the integrator '{self.integrator}' found no solution of a step of {h:g} s: a smaller step size may do"
             )
         return rank
+
+    def _move_anchors(self) -> None:
+        """Bring moving anchors to the present time."""
+        anchor_motion.move_anchors(self._work, self._pairs, self.memory.parameters, self.memory.array[TIME])
 
     def _evaluate(self, q: np.ndarray, v: np.ndarray, extra: np.ndarray, vdot: np.ndarray) -> None:
         self.rank = self.step.evaluate(self.memory.array, q, v, extra, 0.0, vdot)

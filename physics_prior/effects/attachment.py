@@ -1,31 +1,33 @@
-"""Attachments: a point of a part pinned to the world or to another part, or the whole part held."""
+"""Attachments: a point of a part pinned to the world or to another part, or the whole part held; for ever or for a time."""
 
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from pydantic import Field
 
 from physics_prior import rotations
 from physics_prior.effects.effect import Anchor, PointPair
-from physics_prior.effects.two_points import TwoPoints, Vector
+from physics_prior.effects.holding import Holding
+from physics_prior.effects.two_points import Vector
 from physics_prior.model import Tree
 
 
-class Attachment(TwoPoints):
+class Attachment(Holding):
     """A point pinned to a point: a ball joint that closes a loop, a hand on a rail. Three rows."""
 
     kind: ClassVar[str] = "attachment"
+    catches: ClassVar[bool] = True
 
     def explain(self, tree: Tree) -> str:
-        return f"pins a point of {self.part} to {self.to}: 3 rows"
+        return f"pins a point of {self.part} to {self.to}{self._spans()}: 3 rows"
 
     def point_pairs(self, tree: Tree) -> Sequence[PointPair]:
         a, b = self.anchors()
-        return (PointPair(a, b, np.eye(3)),)
+        return (PointPair(a, b, np.eye(3), motion=self.motion),)
 
 
-class Rod(TwoPoints):
+class Rod(Holding):
     """A massless rod: two points keep their distance. One row."""
 
     kind: ClassVar[str] = "rod"
@@ -33,14 +35,14 @@ class Rod(TwoPoints):
     length: float = Field(gt=0.0, description="m, distance the two points keep")
 
     def explain(self, tree: Tree) -> str:
-        return f"keeps a point of {self.part} {self.length:.4g} m from {self.to}: 1 row"
+        return f"keeps a point of {self.part} {self.length:.4g} m from {self.to}{self._spans()}: 1 row"
 
     def point_pairs(self, tree: Tree) -> Sequence[PointPair]:
         a, b = self.anchors()
-        return (PointPair(a, b, np.array([[1.0, 0.0, 0.0]]), self.length),)
+        return (PointPair(a, b, np.array([[1.0, 0.0, 0.0]]), self.length, self.motion),)
 
 
-class Hinge(TwoPoints):
+class Hinge(Holding):
     """A hinge that closes a loop: a common point and a common axis. Five rows."""
 
     kind: ClassVar[str] = "hinge"
@@ -49,43 +51,51 @@ class Hinge(TwoPoints):
     to_axis: Vector = Field(description="the same axis in the frame of `to`")
 
     def explain(self, tree: Tree) -> str:
-        return f"hinges {self.part} to {self.to}: 5 rows"
+        return f"hinges {self.part} to {self.to}{self._spans()}: 5 rows"
 
     def point_pairs(self, tree: Tree) -> Sequence[PointPair]:
         a, b = self.anchors()
         along_a, along_b = _unit(self.to_axis), _unit(self.axis)
         lever = _lever(tree)
         across = _across(along_a)
-        second = PointPair(Anchor(a.part, a.point + lever * along_a), Anchor(b.part, b.point + lever * along_b), across)
-        return (PointPair(a, b, np.eye(3)), second)
+        far_a, far_b = Anchor(a.part, a.point + lever * along_a), Anchor(b.part, b.point + lever * along_b)
+        return (
+            PointPair(a, b, np.eye(3), motion=self.motion),
+            PointPair(far_a, far_b, across, motion=self.motion),
+        )
 
 
-class Weld(TwoPoints):
+class Weld(Holding):
     """A part held in place and orientation. Six rows."""
 
     kind: ClassVar[str] = "weld"
+    catches: ClassVar[bool] = True
 
     orientation: tuple[float, float, float, float] = Field(
         default=(1.0, 0.0, 0.0, 0.0), description="quaternion w, x, y, z: axes of `part` to the frame of `to`"
     )
 
     def explain(self, tree: Tree) -> str:
-        return f"welds {self.part} to {self.to}: 6 rows"
+        return f"welds {self.part} to {self.to}{self._spans()}: 6 rows"
 
     def point_pairs(self, tree: Tree) -> Sequence[PointPair]:
         a, b = self.anchors()
         lever = _lever(tree)
         R = rotations.matrix_from_quaternion(rotations.normalize(np.array(self.orientation)))
         x, y, z = np.eye(3)
-        return (
-            PointPair(a, b, np.eye(3)),
+        rows = ((np.zeros(3), np.eye(3)), (x, np.array([y, z])), (y, np.array([z])))
+        return tuple(
             PointPair(
-                Anchor(a.part, a.point + lever * x),
-                Anchor(b.part, b.point + lever * R.T @ x),
-                np.array([y, z]),
-            ),
-            PointPair(Anchor(a.part, a.point + lever * y), Anchor(b.part, b.point + lever * R.T @ y), np.array([z])),
+                Anchor(a.part, a.point + lever * along),
+                Anchor(b.part, b.point + lever * R.T @ along),
+                directions,
+                motion=self.motion,
+            )
+            for along, directions in rows
         )
+
+    def caught(self, position: np.ndarray, orientation: np.ndarray) -> Self:
+        return super().caught(position, orientation).model_copy(update={"orientation": tuple(orientation.tolist())})
 
 
 def _unit(axis: Vector) -> np.ndarray:

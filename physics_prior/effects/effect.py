@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from physics_prior import rotations
+from physics_prior.effects.anchor_motion import AnchorMotion
 from physics_prior.errors import ModelError
 from physics_prior.model import JointKind, Link, Tree
 
@@ -38,12 +39,14 @@ class PointPair:
         a, b: the two points; the published force acts ON b's part (the opposite one on a's).
         directions: (k, 3) unit vectors in the frame of a's part, k = 1..3 (unused by a rod).
         length: m, of a rod; None where the points coincide.
+        motion: how point a moves, which then is on the world; None where it stays.
     """
 
     a: Anchor
     b: Anchor
     directions: np.ndarray
     length: float | None = None
+    motion: AnchorMotion | None = None
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,7 @@ class Effect(BaseModel):
     """Base of all effects. One effect is one file: parameters with units and bounds, what it adds, why it is there.
 
     An effect overrides what it contributes: ``field`` (an acceleration all mass feels), ``compiled`` + ``parameters`` (a
-    force), ``point_pairs`` (equality rows).
+    force), ``point_pairs`` (equality rows). One with equality rows may come and go: ``active_at``, ``switch_times``.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, allow_inf_nan=False)
@@ -77,6 +80,8 @@ class Effect(BaseModel):
     kind: ClassVar[str]
     """The key that names this effect in a scene file."""
     compiled: ClassVar[CompiledForce | None] = None
+    words: ClassVar[frozenset[str]] = frozenset()
+    """Texts that may stand where its fields have quantities."""
 
     name: str = Field(default="", description="name of its outputs, unique in the scene; the kind where left out")
 
@@ -102,6 +107,14 @@ class Effect(BaseModel):
 
     def point_pairs(self, tree: Tree) -> Sequence[PointPair]:
         """Equality rows; empty for effects that only push."""
+        return ()
+
+    def active_at(self, time: float) -> bool:
+        """Whether it acts by itself at a time, s since the scene's beginning; commands may say otherwise."""
+        return True
+
+    def switch_times(self) -> tuple[float, ...]:
+        """When ``active_at`` changes, s."""
         return ()
 
 

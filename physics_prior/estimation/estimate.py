@@ -5,7 +5,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from physics_prior.dynamics.simulator import Wrench
+from physics_prior.dynamics.wrench import Wrench
 
 
 class Level(IntEnum):

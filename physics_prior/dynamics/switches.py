@@ -1,0 +1,205 @@
+"""What holds at present: attachments that come and go, the impulse with which they take hold, and where they did (eq. 9)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from physics_prior import rotations
+from physics_prior.dynamics.anchor_motion import displaced_anchor
+from physics_prior.dynamics.records import pair_records
+from physics_prior.dynamics.wrench import Wrench
+from physics_prior.effects.effect import Effect
+from physics_prior.effects.holding import Holding
+from physics_prior.errors import ModelError, SimulationError
+
+if TYPE_CHECKING:
+    from physics_prior.dynamics.simulator import Simulator
+
+ASSEMBLED = 1e-10  # m: what taking hold may leave
+MOVED = 1e-12  # m or rad: below it, taking hold has not moved the body
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Whether an effect holds, and where it took hold if it does so wherever its part is.
+
+    Attributes:
+        active: whether its rows act.
+        caught: (7,) the point's position, m, and the part's axes, a quaternion, in the frame of what holds it; else empty.
+    """
+
+    active: bool
+    caught: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Event:
+    """An effect that takes hold or lets go by itself.
+
+    Attributes:
+        time: ns since the scene's beginning.
+        index: of the effect among those that hold something.
+        on: whether it takes hold.
+    """
+
+    time: int
+    index: int
+    on: bool
+
+
+class Switches:
+    """The effects of a simulator that hold something, each with its point pairs [first, last) in the memory."""
+
+    def __init__(self, simulator: "Simulator", effects: Sequence[Effect], spans: Sequence[tuple[int, int]]) -> None:
+        self._simulator, self.effects, self.spans = simulator, tuple(effects), tuple(spans)
+        self.labels = [effect.label for effect in effects]
+        self._holds = tuple(Hold(True) for _ in effects)
+        for index, (first, last) in enumerate(spans):
+            simulator.memory.pairs["here"][first:last] = self._here(index)
+        self.holds = tuple(
+            Hold(effect.active_at(0.0) and not self._here(index)) for index, effect in enumerate(self.effects)
+        )
+        events = [
+            Event(round(time * 1e9), index, effect.active_at(time))
+            for index, effect in enumerate(self.effects)
+            for time in effect.switch_times()
+        ]
+        self.events = tuple(sorted(events, key=lambda event: (event.time, event.index)))
+
+    @property
+    def holds(self) -> tuple[Hold, ...]:
+        """What holds, effect by effect; set, it is what the next step goes by."""
+        return self._holds
+
+    @holds.setter
+    def holds(self, holds: tuple[Hold, ...]) -> None:
+        for index, (old, new) in enumerate(zip(self._holds, holds, strict=True)):
+            if new != old:
+                self._write(index, new)
+        self._holds = tuple(holds)
+
+    @property
+    def rows(self) -> int:
+        """The number of rows that act now."""
+        pairs = self._simulator.memory.pairs
+        return int(pairs["rows"] @ pairs["active"]) if len(pairs) else 0
+
+    def index(self, label: str) -> int:
+        """Where an effect stands among those that hold something.
+
+        Raises:
+            ModelError: none of this name holds anything.
+        """
+        if label not in self.labels:
+            raise ModelError(f"effect '{label}' cannot be switched: those that hold something are {self.labels}")
+        return self.labels.index(label)
+
+    def switched(self, index: int, on: bool, q: np.ndarray) -> tuple[Hold, ...]:
+        """What holds once an effect is switched at configuration q (nq,)."""
+        holds = list(self._holds)
+        holds[index] = Hold(on, self._place(index, q) if on and self._here(index) else ())
+        return tuple(holds)
+
+    def recaught(self, q: np.ndarray) -> tuple[Hold, ...]:
+        """What holds, with the anchors of those that hold wherever their parts were moved to where these are at q."""
+        return tuple(
+            Hold(True, self._place(index, q)) if hold.caught else hold for index, hold in enumerate(self._holds)
+        )
+
+    def take_hold(self, q: np.ndarray, v: np.ndarray) -> dict[str, Wrench]:
+        """Put q and v in place onto all that holds, as something takes hold; return each effect's impulse.
+
+        The position in the mass metric and without kinetic energy being added; the velocity by the impulse L of
+        [M A^T; A 0] [v+; L] = [M v-; 0] (design eq. 9), with a moving anchor's velocity for the zero. Impulses, N s and N m s,
+        are wrenches in all else: ON the held part, about its point, world axes.
+
+        Raises:
+            SimulationError: the position cannot be put there.
+        """
+        if not self.effects:
+            return {}
+        simulator, before, energy = self._simulator, q.copy(), _kinetic_energy(self._simulator, q, v)
+        left = simulator.project(q, v)
+        if not left <= ASSEMBLED:
+            raise SimulationError(
+                f"{self._worst()} cannot take hold: {left:.3g} m stay between the points that it joins"
+            )
+        self._check_sides()
+        impulses = self._impulses()
+        moved = float(np.max(np.abs(simulator.tree.difference(before, q)), initial=0.0))
+        after = _kinetic_energy(simulator, q, v)
+        if moved > MOVED and after > energy and not np.any(simulator.memory.pairs["motion"]):
+            v *= np.sqrt(energy / after)
+        return impulses
+
+    def _here(self, index: int) -> bool:
+        effect = self.effects[index]
+        return isinstance(effect, Holding) and effect.at is None
+
+    def _place(self, index: int, q: np.ndarray) -> tuple[float, ...]:
+        """Where an effect that holds wherever its part is takes hold at q, less its anchor's displacement then."""
+        effect, simulator = self.effects[index], self._simulator
+        assert isinstance(effect, Holding)
+        simulator.move(q, np.zeros(simulator.nv))
+        (x, R), (y, S) = simulator.pose(effect.part), simulator.pose(effect.to)
+        point = x + R @ np.array(effect.point)
+        begin = int(simulator.memory.pairs["motion"][self.spans[index][0]])
+        if begin > 0:
+            point = point - np.array(displaced_anchor(simulator.memory.parameters[begin:], simulator.time)[0])
+        orientation = rotations.quaternion_from_matrix(S.T @ R)
+        return (*(S.T @ (point - y)).tolist(), *orientation.tolist())
+
+    def _write(self, index: int, hold: Hold) -> None:
+        first, last = self.spans[index]
+        memory = self._simulator.memory
+        memory.pairs["active"][first:last] = hold.active
+        memory.work["factored"][0] = 0
+        if hold.caught:
+            effect, tree = self.effects[index], self._simulator.tree
+            assert isinstance(effect, Holding)
+            caught = effect.caught(np.array(hold.caught[:3]), np.array(hold.caught[3:]))
+            records = pair_records(tree, list(caught.point_pairs(tree)))
+            for name in ("point_a", "base", "point_b", "directions"):
+                memory.pairs[name][first:last] = records[name]
+
+    def _impulses(self) -> dict[str, Wrench]:
+        """Impulses of the velocity projection that ``project`` ended with, of what holds."""
+        memory, out = self._simulator.memory, {}
+        multipliers = memory.rows[-2]
+        for label, (first, last), hold in zip(self.labels, self.spans, self._holds, strict=True):
+            if hold.active:
+                pairs = memory.pairs[first:last]
+                forces = np.array(
+                    [multipliers[p["first"] :][: p["rows"]] @ p["d"].reshape(3, 3)[: p["rows"]] for p in pairs]
+                )
+                moment = np.cross(pairs["b"] - pairs["b"][0], forces).sum(axis=0)
+                out[label] = Wrench(forces.sum(axis=0), moment, np.array(pairs["b"][0]))
+        return out
+
+    def _worst(self) -> str:
+        """The effect whose points are furthest apart."""
+        pairs = self._simulator.memory.pairs
+        gaps = np.linalg.norm(pairs["b"] - pairs["a"], axis=1)
+        gaps = np.where(pairs["active"] > 0, np.abs(gaps - pairs["length"]), 0.0)
+        far = int(np.argmax(gaps))
+        return next(
+            f"'{label}'" for label, (first, last) in zip(self.labels, self.spans, strict=True) if first <= far < last
+        )
+
+    def _check_sides(self) -> None:
+        """Refuse a weld or hinge that satisfies its rows turned by half a turn: its levers must point the same way."""
+        pairs = self._simulator.memory.pairs
+        for effect, (first, last), hold in zip(self.effects, self.spans, self._holds, strict=True):
+            if hold.active and isinstance(effect, Holding):
+                for p in range(first + 1, last):
+                    if (pairs["a"][p] - pairs["a"][first]) @ (pairs["b"][p] - pairs["b"][first]) < 0.0:
+                        raise SimulationError(
+                            f"'{effect.label}' cannot take hold: '{effect.part}' is turned by about half a turn from where it"
+                            " should be; start nearer"
+                        )
+
+
+def _kinetic_energy(simulator: "Simulator", q: np.ndarray, v: np.ndarray) -> float:
+    return float(0.5 * v @ simulator.mass_matrix(q) @ v)

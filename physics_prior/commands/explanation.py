@@ -138,8 +138,8 @@ def _state(scene: Scene, simulator: Simulator) -> Table:
 def _constraints(simulator: Simulator) -> str:
     if simulator.rows == 0:
         return "none beside the joints"
-    rows = f"{simulator.rows} rows of rank {simulator.rank}"
-    if simulator.rank < simulator.rows:
+    rows = f"{simulator.switches.rows} rows of rank {simulator.rank}"
+    if simulator.rank < simulator.switches.rows:
         return f"{rows}: the motion is unique, the split of forces is not (the smallest is given)"
     return rows
 

@@ -1,6 +1,6 @@
 """What holds at present: attachments that come and go, the impulse with which they take hold, and where they did (eq. 9)."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from physics_prior import rotations
 from physics_prior.dynamics.anchor_motion import displaced_anchor
+from physics_prior.dynamics.assembly import ASSEMBLED, assemble, turned_over
 from physics_prior.dynamics.records import pair_records
 from physics_prior.dynamics.wrench import Wrench
 from physics_prior.effects.effect import Effect
@@ -17,7 +18,6 @@ from physics_prior.errors import ModelError, SimulationError
 if TYPE_CHECKING:
     from physics_prior.dynamics.simulator import Simulator
 
-ASSEMBLED = 1e-10  # m: what taking hold may leave
 MOVED = 1e-12  # m or rad: below it, taking hold has not moved the body
 
 
@@ -47,6 +47,15 @@ class Event:
     time: int
     index: int
     on: bool
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A time, begin to end in ns since the scene's beginning, in which nothing switches, and what does so at its end."""
+
+    begin: int
+    end: int
+    events: tuple[Event, ...]
 
 
 class Switches:
@@ -86,6 +95,23 @@ class Switches:
         pairs = self._simulator.memory.pairs
         return int(pairs["rows"] @ pairs["active"]) if len(pairs) else 0
 
+    def stretches(self, begin: int, end: int) -> Iterator[Stretch]:
+        """The stretches of a time, in order; its own end is the last one's, and what switches then belongs to it."""
+        for time in sorted({end, *(event.time for event in self.events if begin < event.time < end)}):
+            yield Stretch(begin, time, tuple(event for event in self.events if event.time == time))
+            begin = time
+
+    def follow(self, events: Sequence[Event], q: np.ndarray, v: np.ndarray) -> dict[str, Wrench]:
+        """Switch as scheduled at q and v, which are put in place onto all that holds then; return the impulses.
+
+        Raises:
+            SimulationError: something cannot take hold.
+        """
+        due = [event for event in events if self._holds[event.index].active != event.on]
+        for event in due:
+            self.holds = self.switched(event.index, event.on, q)
+        return self.take_hold(q, v) if any(event.on for event in due) else {}
+
     def index(self, label: str) -> int:
         """Where an effect stands among those that hold something.
 
@@ -121,12 +147,15 @@ class Switches:
         if not self.effects:
             return {}
         simulator, before, energy = self._simulator, q.copy(), _kinetic_energy(self._simulator, q, v)
-        left = simulator.project(q, v)
+        left = assemble(simulator, q, v)
         if not left <= ASSEMBLED:
             raise SimulationError(
                 f"{self._worst()} cannot take hold: {left:.3g} m stay between the points that it joins"
             )
-        self._check_sides()
+        for index in turned_over(simulator):
+            raise SimulationError(
+                f"'{self.labels[index]}' cannot take hold: its part is held by others half a turn away"
+            )
         impulses = self._impulses()
         moved = float(np.max(np.abs(simulator.tree.difference(before, q)), initial=0.0))
         after = _kinetic_energy(simulator, q, v)
@@ -187,18 +216,6 @@ class Switches:
         return next(
             f"'{label}'" for label, (first, last) in zip(self.labels, self.spans, strict=True) if first <= far < last
         )
-
-    def _check_sides(self) -> None:
-        """Refuse a weld or hinge that satisfies its rows turned by half a turn: its levers must point the same way."""
-        pairs = self._simulator.memory.pairs
-        for effect, (first, last), hold in zip(self.effects, self.spans, self._holds, strict=True):
-            if hold.active and isinstance(effect, Holding):
-                for p in range(first + 1, last):
-                    if (pairs["a"][p] - pairs["a"][first]) @ (pairs["b"][p] - pairs["b"][first]) < 0.0:
-                        raise SimulationError(
-                            f"'{effect.label}' cannot take hold: '{effect.part}' is turned by about half a turn from where it"
-                            " should be; start nearer"
-                        )
 
 
 def _kinetic_energy(simulator: "Simulator", q: np.ndarray, v: np.ndarray) -> float:

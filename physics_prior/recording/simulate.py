@@ -47,7 +47,8 @@ def motion(
 
     An unknown force pushes as the scene's noise says, one value a step: its standard deviation is the density over sqrt(h).
     All noise comes from PCG64 streams spawned from the seed, the force's own and one a source, so that what one of them
-    draws does not depend on the others. seed and duration [s] are the scene's where left out.
+    draws does not depend on the others. What holds for a time takes hold and lets go as scheduled, at a moment's stamp before
+    the moment. seed and duration [s] are the scene's where left out.
 
     Raises:
         SimulationError: a seed or duration that is not valid; initial values that cannot be put onto the constraints; a
@@ -59,12 +60,10 @@ def motion(
     streams = np.random.SeedSequence(seed).spawn(1 + len(scene.measurements))
     force_noise, *noises = (np.random.Generator(np.random.PCG64(stream)) for stream in streams)
     q, v = scene.initial.q.copy(), scene.initial.v.copy()
-    left = simulator.project(q, v)
-    if not left <= 1e-9:
-        raise SimulationError(
-            f"the scene's initial positions are {left:.3g} m off the constraints and cannot be put onto them:"
-            " give some that are nearer"
-        )
+    try:
+        simulator.begin(q, v)
+    except SimulationError as problem:
+        raise SimulationError(f"the scene's initial positions do not do: {problem}") from None
     stamp = EPOCH
     for k in range(count + 1):
         measurements = []
@@ -73,10 +72,13 @@ def motion(
             measurements.append(_measure(source, simulator, q, stamp, noise))
         yield Moment(stamp, q.copy(), v.copy(), measurements)
         following = EPOCH + round((k + 1) * NANOSECONDS / scene.simulation.rate)
-        inner, h = steps((following - stamp) * 1e-9, scene.step.size)
-        for _ in range(inner if k < count else 0):
-            tau = scene.noise.force * force_noise.normal(size=simulator.nv) / math.sqrt(h)
-            simulator.advance(q, v, h, tau=tau if scene.simulation.force_noise else None)
+        for stretch in simulator.switches.stretches(stamp - EPOCH, following - EPOCH) if k < count else ():
+            inner, h = steps((stretch.end - stretch.begin) * 1e-9, scene.step.size)
+            for _ in range(inner):
+                tau = scene.noise.force * force_noise.normal(size=simulator.nv) / math.sqrt(h)
+                simulator.advance(q, v, h, tau=tau if scene.simulation.force_noise else None)
+            simulator.time = stretch.end * 1e-9
+            simulator.switches.follow(stretch.events, q, v)
         stamp = following
 
 

@@ -1,9 +1,10 @@
 """Scene files read: from YAML to a checked Scene, every error naming file, line and field."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
+from pydantic import BaseModel
 
 from physics_prior.effects import REGISTRY, Effect
 from physics_prior.errors import PhysicsPriorError, SceneError
@@ -58,7 +59,7 @@ def _read_effects(place: Place, tree: Tree) -> tuple[Effect, ...]:
     known = list(tree.frames) + joints
     for entry in place.entries():
         _, effect_type, inner = choose(entry, REGISTRY, "an effect")
-        effect = validate(effect_type, inner, _in_si_units(effect_type, inner))
+        effect = validate(effect_type, inner, _in_si_units(effect_type, inner, effect_type.words))
         try:
             check_name(effect.label)
             effect.check(tree)
@@ -76,14 +77,26 @@ def _read_effects(place: Place, tree: Tree) -> tuple[Effect, ...]:
     return tuple(effects)
 
 
-def _in_si_units(effect_type: type[Effect], place: Place) -> dict[str, Any]:
-    """Fields of an effect as plain values, quantities in SI units, which its own descriptions state."""
+def _in_si_units(model: type[BaseModel], place: Place, words: frozenset[str] = frozenset()) -> dict[str, Any]:
+    """Fields of an effect as plain values, quantities in SI units, which its own descriptions state; words stay texts."""
     values = {}
     for key, entry in place.items():
-        field = effect_type.model_fields.get(key)
+        field = model.model_fields.get(key)
         units = stated_units(field.description) if field is not None else ()
-        values[key] = _converted(entry, units) if units else entry.value
+        inner = _model_of(field.annotation) if field is not None else None
+        if inner is not None and entry.is_mapping and not units:
+            values[key] = _in_si_units(inner, entry)
+        elif units and not (isinstance(entry.value, str) and entry.value in words):
+            values[key] = _converted(entry, units)
+        else:
+            values[key] = entry.value
     return values
+
+
+def _model_of(annotation: Any) -> type[BaseModel] | None:
+    """The model that a field holds, if it holds one, optional or not."""
+    kinds = [kind for kind in (annotation, *get_args(annotation)) if isinstance(kind, type)]
+    return next((kind for kind in kinds if issubclass(kind, BaseModel)), None)
 
 
 def _converted(place: Place, units: tuple[str, ...]) -> Any:
@@ -106,6 +119,7 @@ def _check_finite(effect: Effect, tree: Tree) -> bool:
         pairs = effect.point_pairs(tree)
         arrays = [effect.field(), effect.parameters(tree)]
         arrays += [array for pair in pairs for array in (pair.a.point, pair.b.point, pair.directions)]
+        arrays += [pair.motion.table(np.eye(3)) for pair in pairs if pair.motion is not None]
     if not all(np.all(np.isfinite(array)) for array in arrays):
         raise SceneError("makes numbers that are not finite: an axis must not be zero")
     return len(pairs) > 0

@@ -41,9 +41,7 @@ def chain():
 
 HAND = Attachment(name="hand", part="lower", point=(0.0, 0.0, -1.0), at="here", initially="off")
 GRIP = Weld(name="grip", part="box", at="here", initially="off")
-TETHER = Rod(
-    name="tether", part="upper", point=(0.0, 0.1, -0.5), at=(0.0, 0.3, 0.4), length=1.0, initially="off"
-)
+TETHER = Rod(name="tether", part="upper", point=(0.0, 0.1, -0.5), at=(0.0, 0.3, 0.4), length=1.0, initially="off")
 EFFECTS = [GRAVITY, HAND, GRIP, TETHER]
 
 
@@ -66,7 +64,9 @@ def on_from_the_start(simulator, effect):
     return named(simulator, effect).model_copy(update={"initially": "on"})
 
 
-@pytest.mark.parametrize("held", [(), ("hand",), ("grip",), ("tether",), ("hand", "tether"), ("hand", "grip", "tether")])
+@pytest.mark.parametrize(
+    "held", [(), ("hand",), ("grip",), ("tether",), ("hand", "tether"), ("hand", "grip", "tether")]
+)
 def test_what_is_off_does_nothing(held, chain, random_state):
     """Motion, derivatives, rank and wrenches are those of a scene that does not name what is off."""
     rng = np.random.default_rng(1)
@@ -74,19 +74,33 @@ def test_what_is_off_does_nothing(held, chain, random_state):
     simulator = with_tether(chain, q)
     for label in simulator.switches.labels:
         simulator.switch(label, label in held, q, v)
-    alone = Simulator(chain, [GRAVITY, *(on_from_the_start(simulator, each) for each in simulator.switches.effects if each.label in held)])
+    alone = Simulator(
+        chain,
+        [GRAVITY, *(on_from_the_start(simulator, each) for each in simulator.switches.effects if each.label in held)],
+    )
     assert off(simulator.acceleration(q, v), alone.acceleration(q, v)) < 1e-12  # measured 3e-14
     assert simulator.rank == alone.rank
     assert simulator.switches.rows == alone.rows
-    for ours, theirs in zip(simulator.acceleration_derivatives(q, v), alone.acceleration_derivatives(q, v), strict=True):
+    for ours, theirs in zip(
+        simulator.acceleration_derivatives(q, v), alone.acceleration_derivatives(q, v), strict=True
+    ):
         assert off(ours, theirs) < 1e-10  # measured 2e-12
     wrenches, expected = simulator.wrenches(q, v), alone.wrenches(q, v)
     for name, wrench in wrenches.items():
         force = expected[name].force if name in expected else np.zeros(3)
         assert off(wrench.force, force) < 1e-10  # measured 4e-13
-    (F, G), (F_alone, G_alone) = (each.linearise(q.copy(), v.copy(), 1e-3, np.ones(chain.nv)) for each in (simulator, alone))
+    (F, G), (F_alone, G_alone) = (
+        each.linearise(q.copy(), v.copy(), 1e-3, np.ones(chain.nv)) for each in (simulator, alone)
+    )
     assert off(G, G_alone) < 1e-10  # measured 2e-13
-    assert off(F @ G, F_alone @ G) < 1e-10  # measured 2e-13; errors that the rows forbid apart, G has none
+    A, A_q = alone.tangent_rows(q, v)
+    allowed = np.eye(2 * chain.nv)
+    if held:
+        left = 2 * chain.nv - 2 * alone.rank
+        allowed = np.linalg.svd(np.block([[A, np.zeros_like(A)], [A_q, A]]))[2][-left:].T
+    assert (
+        off(F @ allowed, F_alone @ allowed) < 1e-6
+    )  # measured 1e-8: the step leaves the rows by O(h^5), which one of them projects
     simulator.advance(q, v, 1e-3, 100)
     assert np.max(np.abs(simulator.constraint_error(q, v))) < 1e-11 or not held
 
@@ -181,21 +195,28 @@ def test_what_cannot_be_reached_is_refused_with_what_is_left():
     q, v = np.array([1.0]), np.zeros(1)
     with pytest.raises(SimulationError, match="'attachment' cannot take hold: 2 m stay between"):
         simulator.switch("attachment", True, q, v)
-    with pytest.raises(ModelError, match="effect 'hand' cannot be switched: .*'attachment'"):
+    with pytest.raises(ModelError, match=r"effect 'hand' cannot be switched: .*\['attachment'\]"):
         simulator.switch("hand", True, q, v)
 
 
 @pytest.mark.parametrize("axis", np.eye(3))
 @pytest.mark.parametrize("angle", [170.0, 179.999, 180.0])
 def test_a_weld_never_sticks_at_half_a_turn(axis, angle):
-    """Its rows are satisfied there too (a lever that points backwards); it is turned, or refused with a sentence."""
+    """Its rows are satisfied there too, by a lever that points backwards."""
     body = Tree([Part("box", inertia.box(3.0, (0.3, 0.2, 0.1)))], [Joint("flight", JointKind.FREE, "world", "box")])
     simulator = Simulator(body, [Weld(part="box", initially="off")])
     q, v = body.neutral(), np.zeros(6)
     q[3:] = rotations.exp(np.radians(angle) * axis)
-    try:
-        simulator.switch("weld", True, q, v)
-    except SimulationError as problem:
-        assert "about half a turn" in str(problem)
-    else:
-        assert off(np.abs(q), body.neutral()) < 1e-10
+    simulator.switch("weld", True, q, v)
+    assert off(np.sign(q[3]) * q, body.neutral()) < 1e-12  # measured 1e-16
+
+
+def test_what_others_hold_half_a_turn_away_is_refused():
+    body = Tree(
+        [Part("box", inertia.box(3.0, (0.3, 0.2, 0.1)))],
+        [Joint("pin", JointKind.REVOLUTE, "world", "box", axis=np.array([0.0, 0.0, 1.0]))],
+    )
+    backwards = Weld(part="box", orientation=(0.0, 1.0, 0.0, 0.0), initially="off")
+    simulator = Simulator(body, [backwards])
+    with pytest.raises(SimulationError, match="'weld' cannot take hold: its part is held by others half a turn away"):
+        simulator.switch("weld", True, np.zeros(1), np.zeros(1))

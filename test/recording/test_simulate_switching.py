@@ -1,0 +1,92 @@
+"""Simulated scenes in which something takes hold and lets go as scheduled."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from physics_prior.dynamics.simulator import Simulator
+from physics_prior.errors import SceneError
+from physics_prior.recording.simulate import motion
+from physics_prior.scene import load_scene
+
+SCENE = """
+description: A pendulum that is caught and released.
+model:
+  parts:
+    rod:
+      mass: 1 kg
+      center_of_mass: [0, 0, -0.5]
+      inertia: {rod: 1 m}
+      joint: {kind: revolute, axis: y, name: pivot}
+effects:
+  - gravity
+  - attachment: {name: hand, part: rod, point: [0, 0, -1], at: here, when: WHEN}
+noise: {force: 1e-2}
+measurements:
+  - joints: {topic: /encoder, joints: {pivot: pivot}, noise: 1 deg}
+initial: {positions: {pivot: 60 deg}}
+simulation: {duration: 2 s, rate: 100 Hz}
+"""
+
+
+@pytest.fixture
+def scene_of(tmp_path):
+    def load(when, **changes):
+        path = tmp_path / "caught.yaml"
+        text = SCENE.replace("WHEN", when)
+        for old, new in changes.items():
+            text = text.replace(old, new)
+        path.write_text(text)
+        return load_scene(path)
+
+    return load
+
+
+@pytest.mark.parametrize(
+    ("when", "windows"),
+    [
+        ("{from: 0.5 s, until: 800 ms}", [(0.5, 0.8)]),
+        (
+            "[{until: 0.1235 s}, {from: 0.3, until: 0.3051 s}, {from: 1.5 s}]",
+            [(0.0, 0.1235), (0.3, 0.3051), (1.5, 9.0)],
+        ),
+    ],
+)
+def test_what_is_scheduled_holds_in_its_windows_and_only_there(scene_of, when, windows):
+    """Also at times between two measurements, and at time zero."""
+    scene = scene_of(when)
+    simulator = Simulator(scene.tree, scene.effects, scene.step.integrator)
+    moments = list(motion(scene, simulator))
+    for before, moment in pairwise(moments):
+        now, then = ((each.stamp - moments[0].stamp) * 1e-9 for each in (moment, before))
+        held, held_before = (any(begin <= time < end for begin, end in windows) for time in (now, then))
+        still = abs(moment.v[0]) < 1e-12
+        assert still == held or (held_before and not held)
+        if held and held_before:
+            assert abs(moment.q[0] - before.q[0]) < 1e-12
+    assert simulator.switches.holds[0].active == held
+
+
+def test_a_window_that_cannot_be_is_refused_where_it_stands(scene_of):
+    with pytest.raises(SceneError, match=r"attachment.when.*: until 1 s is not valid: give more than from, 2 s"):
+        scene_of("{from: 2 s, until: 1 s}")
+    with pytest.raises(SceneError, match=r"attachment.when.*'form'"):
+        scene_of("{form: 2 s}")
+    with pytest.raises(SceneError, match=r"attachment.when.*: '2 m' is not a quantity in s"):
+        scene_of("{from: 2 m}")
+
+
+def test_motions_are_read_with_units(scene_of):
+    motion_of = "{sine: {amplitude: [10 cm, 0, 0], frequency: 0.5 Hz, phase: 90 deg}}"
+    scene = scene_of("{from: 0.5}", **{"at: here": f"at: [0, 0, -1], motion: {motion_of}"})
+    sine = scene.effects[1].motion.sine
+    assert sine.amplitude == (0.1, 0.0, 0.0)
+    assert sine.frequency == 0.5
+    assert sine.phase == pytest.approx(np.pi / 2)
+    with pytest.raises(SceneError, match="'10 s' is not a quantity in m"):
+        scene_of(
+            "{from: 0.5}", **{"at: here": "at: [0, 0, -1], motion: {sine: {amplitude: [10 s, 0, 0], frequency: 1}}"}
+        )
+    with pytest.raises(SceneError, match="attachment.at: 'there' is not"):
+        scene_of("{from: 0.5}", **{"at: here": "at: there"})

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 ASSEMBLED = 1e-10  # m: what may be left
 NEAR = 1e-6  # m: from here on, projection does the rest
 STEPS = 100
+SHORTEST = 1e-6  # of a Newton step
 GAIN = 0.1  # share of what a step promises that it must keep
 LARGEST_TURN = 0.5  # rad in one step
 
@@ -31,8 +32,8 @@ def assemble(simulator: "Simulator", q: np.ndarray, v: np.ndarray) -> float:
     _descend(simulator, q)
     for index in turned_over(simulator):
         _turn_back(simulator, q, index)
-    _descend(simulator, q)
-    return simulator.project(q, v)
+    left = _descend(simulator, q)
+    return simulator.project(q, v) if left < NEAR else left
 
 
 def turned_over(simulator: "Simulator") -> list[int]:
@@ -48,27 +49,37 @@ def turned_over(simulator: "Simulator") -> list[int]:
     return out
 
 
-def _descend(simulator: "Simulator", q: np.ndarray) -> None:
-    """Move q in place towards the constraints by Newton steps in the mass metric, each as long as it keeps its promise."""
+def _descend(simulator: "Simulator", q: np.ndarray) -> float:
+    """Move q in place towards the constraints by Newton steps in the mass metric, each as long as it keeps its promise.
+
+    Returns the largest error left, m.
+    """
     still = np.zeros(simulator.nv)
     error = simulator.constraint_error(q, still)
     for _ in range(STEPS):
         size = float(np.linalg.norm(error))
         if size < NEAR:
-            return
+            break
         A, _ = simulator.tangent_rows(q, still)
         M = simulator.mass_matrix(q)
         step = -np.linalg.solve(M, A.T) @ _pseudo_solve(A @ np.linalg.solve(M, A.T), error)
-        length = 1.0
-        while length > 1e-6:
-            tried = simulator.displaced(q, length * step)
-            error = simulator.constraint_error(tried, still)
-            if np.linalg.norm(error) <= (1.0 - GAIN * length) * size:
-                break
-            length *= 0.5
-        else:
-            return
+        tried, length = _search(simulator, q, step, size)
+        if length == 0.0:
+            break
         q[:] = tried
+        error = simulator.constraint_error(q, still)
+    return float(np.max(np.abs(simulator.constraint_error(q, still))))
+
+
+def _search(simulator: "Simulator", q: np.ndarray, step: np.ndarray, size: float) -> tuple[np.ndarray, float]:
+    """The configuration that much of a step leads to which makes the error, of that size, smaller; and how much of it."""
+    length = 1.0
+    while length > SHORTEST:
+        tried = simulator.displaced(q, length * step)
+        if np.linalg.norm(simulator.constraint_error(tried, np.zeros(simulator.nv))) <= (1.0 - GAIN * length) * size:
+            return tried, length
+        length *= 0.5
+    return q, 0.0
 
 
 def _turn_back(simulator: "Simulator", q: np.ndarray, index: int) -> None:

@@ -88,5 +88,5 @@ def test_motions_are_read_with_units(scene_of):
         scene_of(
             "{from: 0.5}", **{"at: here": "at: [0, 0, -1], motion: {sine: {amplitude: [10 s, 0, 0], frequency: 1}}"}
         )
-    with pytest.raises(SceneError, match="attachment.at: 'there' is not"):
+    with pytest.raises(SceneError, match=r"attachment\.at: 'there' is not"):
         scene_of("{from: 0.5}", **{"at: here": "at: there"})

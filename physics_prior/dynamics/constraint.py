@@ -35,6 +35,9 @@ REGULARISATION = 1e-10  # of the mean diagonal: small steps are not safer near a
 DEPENDENT = 1e3  # a pivot within this factor of the regularisation belongs to a row that adds nothing
 REFINEMENTS = 3
 EXACT = 1e-15  # of the right side: refinement stops there
+UNMET = (
+    1e-11  # of the right side: more is left only of rows that contradict each other, or hardly hold a motion (a fold)
+)
 POSITION_TOLERANCE = 1e-11  # m: what projection leaves
 ROUNDING = 1e-15  # m: no projection goes below
 
@@ -231,11 +234,14 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: 
 
 
 @kernel
-def multiply(rows: Array) -> None:
-    """Solve A M^-1 A^T answer = right side, proximally; fills the answer, spoils the right side."""
+def multiply(rows: Array) -> float:
+    """Solve A M^-1 A^T answer = right side, proximally; return how much of the right side is left, relative to it.
+
+    Fills the answer, spoils the right side.
+    """
     m, w = row_count(rows), width(rows)
     left, answer, change = rows[m], rows[m + 1], rows[m + 2]
-    size = 0.0
+    size, rest = 0.0, 0.0
     for r in range(m):
         answer[r] = 0.0
         size = max(size, abs(left[r]))
@@ -262,6 +268,7 @@ def multiply(rows: Array) -> None:
             rest = max(rest, abs(left[r]))
         if rest <= EXACT * size:
             break
+    return rest / size if size > 0.0 else 0.0
 
 
 @kernel
@@ -344,15 +351,15 @@ def complete(links: Records, work: Records, pairs: Records, rows: Array, known: 
 @kernel
 def constrain_acceleration(
     links: Records, work: Records, pairs: Records, rows: Array, gravity: Array, vdot: Array, spare: Array
-) -> None:
-    """Add constraint forces to free accelerations: vdot (nv,) and the links'; fill pair.force.
+) -> float:
+    """Add constraint forces to free accelerations: vdot (nv,) and the links'; fill pair.force; return what ``multiply`` does.
 
     Needs ``refresh`` and ``accelerate``. The system is design eq. 4 with f_c = +A^T lambda, so that pair.force acts ON link
     b. spare (2, nv) is scratch.
     """
     nv, m = vdot.shape[0], row_count(rows)
     acceleration_error(work, pairs, gravity, rows[m])
-    multiply(rows)
+    unmet = multiply(rows)
     respond(links, work, rows, spare[0], spare[1])
     for k in range(nv):
         vdot[k] += spare[1, k]
@@ -366,6 +373,7 @@ def constrain_acceleration(
         for row in range(pair.rows):
             force = plus(force, scale(rows[m + 1, pair.first + row], direction(pair, row)))
         put3(pair.force, force)
+    return unmet
 
 
 @kernel

@@ -23,7 +23,7 @@ TIME, TOLERANCE, VECTORS, WORKSPACE = 6, 7, 8, 9
 LINK_SIZE, WORK_SIZE, PAIR_SIZE = LINK.itemsize // 8, WORK.itemsize // 8, PAIR.itemsize // 8
 FREEDOM_SIZE, COMPOSITE_SIZE, GAP_SIZE = FREEDOM.itemsize // 8, COMPOSITE.itemsize // 8, GAP.itemsize // 8
 FLOAT = np.dtype(np.float64)
-SPARE = 9  # vectors (nv,) of scratch that every step needs
+SPARE = 13  # vectors (nv,) of scratch that every step needs; the last four are those of ``evaluate`` at a fold
 
 
 class Memory:

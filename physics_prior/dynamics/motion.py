@@ -12,6 +12,7 @@ from physics_prior.dynamics.arrays import add_product, clear, copy, subtract_tra
 from physics_prior.dynamics.articulated_body import accelerate, factorize
 from physics_prior.dynamics.constraint import (
     POSITION_TOLERANCE,
+    UNMET,
     constrain_acceleration,
     multiply_columns,
     refresh,
@@ -23,13 +24,15 @@ from physics_prior.dynamics.derivatives import inverse_dynamics_derivatives, swe
 from physics_prior.dynamics.gyroscopic import take_at_middle
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kinematics import flow, pose, weigh
+from physics_prior.dynamics.manifold import displace
 from physics_prior.dynamics.mass_factor import factorize_mass, solve_mass
-from physics_prior.dynamics.memory import TIME, correction_sections, sections, tangent_sections
+from physics_prior.dynamics.memory import SPARE, TIME, correction_sections, sections, tangent_sections
 from physics_prior.dynamics.projection import project
 from physics_prior.dynamics.types import Array
 from physics_prior.effects.none import differentiate_forces, forces, potential_energy  # scene: effects
 
 CONSTRAINED = False  # scene: constraints
+BESIDE, CLEAR = 3e-4, 3e-3  # rad or m that the fastest freedom moves to either side of a fold, and to be clear of it
 
 
 @kernel
@@ -38,9 +41,18 @@ def evaluate(memory: Array, q: Array, v: Array, extra: Array, step: float, vdot:
 
     step > 0 takes gyroscopic torques at the middle of such a step.
     """
+    rank, unmet = evaluate_at(memory, q, v, extra, step, vdot)
+    if CONSTRAINED and unmet > UNMET:
+        rank = evaluate_beside(memory, q, v, extra, step, vdot, rank)
+    return rank
+
+
+@kernel
+def evaluate_at(memory: Array, q: Array, v: Array, extra: Array, step: float, vdot: Array) -> tuple[int, float]:
+    """``evaluate``, where nothing folds; return, too, what is unmet of the constraints, relative."""
     links, work, pairs, rows, known, _, spare, parameters = sections(memory)
     gravity, tau = parameters[:3], spare[2]
-    rank = 0
+    rank, unmet = 0, 0.0
     if CONSTRAINED:
         move_anchors(work, pairs, parameters, memory[TIME])
         rank = refresh(links, work, pairs, rows, known, q)
@@ -55,7 +67,46 @@ def evaluate(memory: Array, q: Array, v: Array, extra: Array, step: float, vdot:
     forces(parameters, links, work, q, v, tau)
     accelerate(links, work, tau, gravity, vdot)
     if CONSTRAINED:
-        constrain_acceleration(links, work, pairs, rows, gravity, vdot, spare)
+        unmet = constrain_acceleration(links, work, pairs, rows, gravity, vdot, spare)
+    return rank, unmet
+
+
+@kernel
+def evaluate_beside(memory: Array, q: Array, v: Array, extra: Array, step: float, vdot: Array, rank: int) -> int:
+    """Where the mechanism folds: the mean of the motion a little ahead and a little behind; vdot + O(BESIDE^2).
+
+    At a dead centre rows lose the rank that they have beside it, and the motion that they let go would take its free
+    acceleration; on either side the forces that hold it grow like one over the distance, with opposite signs. The mechanism
+    crosses by their principal value. Forces are those of the side it comes from. Where the rank is the same beside, rows
+    are redundant and merely contradict each other in a stage of a step: vdot stays.
+    """
+    links, work, pairs, rows, known, _, spare, _ = sections(memory)
+    nq, nv, time = q.shape[0], v.shape[0], memory[TIME]
+    delta, ahead, side = spare[SPARE - 4], spare[SPARE - 3], spare[SPARE - 2 : SPARE].reshape(-1)[:nq]
+    fastest = 0.0
+    for k in range(nv):
+        fastest = max(fastest, abs(v[k]))
+    if fastest == 0.0:
+        return rank
+    for k in range(nv):
+        delta[k] = CLEAR / fastest * v[k]
+    displace(links, q, delta, side)
+    if refresh(links, work, pairs, rows, known, side) <= rank:
+        return refresh(links, work, pairs, rows, known, q)
+    tau = BESIDE / fastest
+    for k in range(nv):
+        delta[k] = tau * v[k]
+    displace(links, q, delta, side)
+    memory[TIME] = time + tau
+    evaluate_at(memory, side, v, extra, step, ahead)
+    for k in range(nv):
+        delta[k] = -delta[k]
+    displace(links, q, delta, side)
+    memory[TIME] = time - tau
+    rank, _ = evaluate_at(memory, side, v, extra, step, vdot)
+    memory[TIME] = time
+    for k in range(nv):
+        vdot[k] = 0.5 * (vdot[k] + ahead[k])
     return rank
 
 

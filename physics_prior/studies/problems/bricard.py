@@ -1,5 +1,7 @@
 """Bricard's mechanism, A04 of the IFToMM library: it moves although its rows, counted, hold it fast."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from physics_prior import inertia
@@ -23,7 +25,7 @@ def bricard() -> Benchmark:
     counting leaves none.
     """
     parts, joints = [], []
-    for i, (begin, end) in enumerate(zip(POINTS[:-1], POINTS[1:], strict=True)):
+    for i, (begin, end) in enumerate(pairwise(POINTS)):
         size = np.where(begin == end, WIDTH, 1.0)
         body = inertia.box(1.0, size).transformed(np.eye(3), 0.5 * (end - begin))
         position = begin - POINTS[i - 1] if i else begin

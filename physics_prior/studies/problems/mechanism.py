@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from physics_prior import rotations
-from physics_prior.dynamics.compose import RUNGE_KUTTA
+from physics_prior.dynamics.integrators import DEFAULT, IntegratorName
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects import Effect
 from physics_prior.model import Tree
@@ -30,7 +30,7 @@ class Mechanism:
     v: np.ndarray
     tau: np.ndarray | None = None
 
-    def run(self, integrator: str = RUNGE_KUTTA, effects: Sequence[Effect] | None = None) -> "Run":
+    def run(self, integrator: IntegratorName = DEFAULT, effects: Sequence[Effect] | None = None) -> "Run":
         """A motion that begins at the start, put onto the constraints; effects other than its own where given."""
         simulator = Simulator(self.tree, self.effects if effects is None else effects, integrator)
         run = Run(simulator, self.q.copy(), self.v.copy(), self.tau)

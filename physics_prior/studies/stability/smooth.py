@@ -6,7 +6,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from physics_prior import rotations
-from physics_prior.dynamics.compose import RUNGE_KUTTA, SEMI_IMPLICIT_EULER
+from physics_prior.dynamics.integrators import INTEGRATORS
 from physics_prior.effects.gravity import Gravity
 from physics_prior.inertia import MassProperties
 from physics_prior.model import Joint, JointKind, Part, Tree
@@ -19,7 +19,6 @@ from physics_prior.studies.stability.case import Check, Curve, Measurements, Pic
 
 SHORTFALL = 0.2  # of the order that a fitted slope may show
 HALVINGS = 4
-ORDERS = {RUNGE_KUTTA: 4, SEMI_IMPLICIT_EULER: 1}
 COARSEST = {1: 1e-3, 2: 5e-3, 4: 2e-2}
 """Order -> s, the first of the steps that are halved: the smallest must stay clear of rounding."""
 
@@ -32,6 +31,7 @@ FLOOR = 1e-8  # m or rad: what rounding has made of itself by then need not fall
     "MuJoCo RK4 3.6e-11 m, its Euler 2.2e-3 m, Exudyn 1.2e-4 m (10 s, 1 ms)",
 )
 def simple_pendulum(thorough: bool) -> Measurements:
+    """Position and energy of the IFToMM pendulum, against its elliptic functions."""
     benchmark = pendulum.simple_pendulum()
     run = benchmark.run()
     times, errors = benchmark.errors(run, 1e-3)
@@ -74,16 +74,17 @@ def _energy_drift(benchmark: Benchmark, h: float, seconds: float) -> float:
     "MuJoCo and Pinocchio RK4: 4.0, the Eulers 1.0; Exudyn 2.0",
 )
 def convergence(thorough: bool) -> Measurements:
+    """Every integrator, over four halvings of the step, against references of other origin."""
     curves = []
-    for name, order in ORDERS.items():
+    for name, integrator in INTEGRATORS.items():
         for benchmark, mechanism in ((pendulum.double_pendulum(), "double pendulum"), (_ball_pendulum(), "ball joint")):
-            coarsest = COARSEST[order]
+            coarsest = COARSEST[integrator.order]
             steps = coarsest * 0.5 ** np.arange(HALVINGS + 1)
             errors = np.array([benchmark.errors(benchmark.run(name), h, until=1.0)[1][-1] for h in steps])
             slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
-            shortfall = order - slope
-            yield Check(f"order {order} less the slope, {name}, {mechanism}", shortfall, SHORTFALL)
-            if order >= 4:
+            shortfall = integrator.order - slope
+            yield Check(f"order {integrator.order} less the slope, {name}, {mechanism}", shortfall, SHORTFALL)
+            if integrator.order >= 4:
                 yield Check(f"error at the smallest step, {name}, {mechanism}", float(errors[-1]), 1e-9)
             curves.append(Curve(f"{name}, {mechanism}: slope {slope:.2f}", steps, errors))
     yield Picture("convergence", "Order of convergence over 1 s", "step [s]", "error [m or rad]", curves, "xy")
@@ -116,6 +117,7 @@ def _ball_pendulum() -> Benchmark:
     "index-1 RK4 fails on the four-bar at every h; Pinocchio's N = 40 is 1600x worse at 2 ms",
 )
 def smaller_steps(thorough: bool) -> Measurements:
+    """A smaller step never does worse: 1e-2, 1e-3, 1e-4 s; and steps in one call are steps one by one."""
     mechanisms = {
         "double pendulum": pendulum.double_pendulum(),
         "four-bar": four_bar(1, 10.0),

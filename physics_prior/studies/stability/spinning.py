@@ -4,7 +4,6 @@ import numpy as np
 from scipy.special import ellipk, ellipkinc
 
 from physics_prior import inertia, rotations
-from physics_prior.dynamics.compose import SEMI_IMPLICIT_EULER
 from physics_prior.effects import Effect
 from physics_prior.effects.attachment import Weld
 from physics_prior.model import Joint, JointKind, Part, Tree
@@ -19,6 +18,7 @@ from physics_prior.studies.stability.case import Check, Curve, Measurements, Pic
     "energy, 1 ms: MuJoCo RK4 5e-6, implicit 4.8e-2, Euler 3.8e7",
 )
 def fast_heavy_top(thorough: bool) -> Measurements:
+    """Bruels, Cardona and Arnold: attitude and energy."""
     benchmark = heavy_top()
     run, energies = benchmark.run(), []
     times = 1e-3 * np.arange(1, 1001)
@@ -30,7 +30,7 @@ def fast_heavy_top(thorough: bool) -> Measurements:
     yield Check("energy over 1 s, RK4, 1 ms, relative", max(energies), 1e-5)
     _, best = benchmark.errors(benchmark.run(), 5e-5)
     yield Check("attitude over 1 s, RK4, 0.05 ms", float(best.max()), 1e-7, "rad")
-    euler, spun = benchmark.run(SEMI_IMPLICIT_EULER), []
+    euler, spun = benchmark.run("semi_implicit_euler"), []
     for time in times:
         euler.to(float(time), 1e-3)
         spun.append(abs(euler.energy() - start) / abs(start))
@@ -51,6 +51,7 @@ def fast_heavy_top(thorough: bool) -> Measurements:
     "MuJoCo Euler 2.1e-2 rad and 0.58 % of energy in 5 s, 1 ms; avian, ODE: drift to the steady spin",
 )
 def dzhanibekov(thorough: bool) -> Measurements:
+    """Momentum, energy and the moments of the flips, against their elliptic functions."""
     benchmark = free_top()
     moments = np.array([1.0, 2.0, 3.0])
     run = benchmark.run()
@@ -62,7 +63,7 @@ def dzhanibekov(thorough: bool) -> Measurements:
         rates.append(run.v[3:].copy())
     w, times = np.array(rates), 1e-3 * np.arange(50_001)
     momentum = rotations.rotate(np.array(samples), moments * w)
-    length = np.linalg.norm(momentum[0])
+    length = float(np.linalg.norm(momentum[0]))
     yield Check("angular momentum in the world, relative", _worst(momentum - momentum[0]) / length, 1e-10)
     energy = 0.5 * np.sum(moments * w * w, axis=1)
     yield Check("energy, relative", _worst(energy[:, None] - energy[0]) / energy[0], 1e-10)
@@ -120,6 +121,7 @@ def _flip_times(moments: np.ndarray, w: np.ndarray) -> np.ndarray:
     "mujoco #3553: BADQACC when nested",
 )
 def welded(thorough: bool) -> Measurements:
+    """The same body three ways: one part, two parts on a fixed joint, two free parts held by a weld."""
     core, wing = inertia.box(1.0, (0.3, 0.2, 0.1)), inertia.box(0.4, (0.1, 0.4, 0.05))
     place, tilt = np.array([0.2, 0.1, 0.05]), rotations.exp([0.3, -0.5, 0.7])
     moved = wing.transformed(rotations.matrix_from_quaternion(tilt), place)
@@ -148,6 +150,7 @@ def welded(thorough: bool) -> Measurements:
 
 @case(22, "Norm of quaternions over 1e6 steps; norms that are off at the start", "drake #14800, pinocchio #328")
 def quaternion_norm(thorough: bool) -> Measurements:
+    """Quaternions stay unit; one that is not at the start moves as if it were."""
     for name, mechanism in (("free top", free_top()), ("heavy top", heavy_top())):
         run, worst = mechanism.run(), 0.0
         for _ in range(100):

@@ -1,6 +1,6 @@
 """Compose the step of a scene: its equation of motion with just the effects that it names, its integrator, the step.
 
-Three files of this folder, motion.py, one of integrators/ and step.py, become one module, in which each finds what it
+Files of this folder, motion.py, those of one integrator and step.py, become one module, in which each finds what it
 imports from those before it. The module is a small readable file in the kernel cache (``physics-prior check
 --show-step`` prints it). One line an effect; the effects inline into it, the disk cache hits on the next start, and an
 edit of an effect misses it as it must, because the module's name is a digest of its text in a folder keyed by all kernel
@@ -18,6 +18,7 @@ from types import ModuleType
 
 import numpy as np
 
+from physics_prior.dynamics.integrators import INTEGRATORS, IntegratorName
 from physics_prior.dynamics.kernel import cache_directory, inline_kernel
 from physics_prior.dynamics.types import Array
 from physics_prior.effects.effect import Effect
@@ -47,9 +48,10 @@ def section(parameters: Array, index: int) -> Array:
     return parameters[int(parameters[GRAVITY + index]) : int(parameters[GRAVITY + index + 1])]
 
 
-def step_source(effects: Sequence[Effect], constrained: bool, integrator: str) -> str:
+def step_source(effects: Sequence[Effect], constrained: bool, integrator: IntegratorName) -> str:
     """The text of a scene's step module."""
-    texts = {name: _text(name) for name in ("motion", f"integrators.{integrator}", "step")}
+    files = INTEGRATORS[integrator].files
+    texts = {name: _text(name) for name in ("motion", *(f"integrators.{file}" for file in files), "step")}
     imports = ["from physics_prior.dynamics.compose import section"]
     names: dict[str, str] = {}
     lines: dict[str, list[str]] = {each: [] for each in FUNCTIONS}
@@ -78,7 +80,7 @@ def step_source(effects: Sequence[Effect], constrained: bool, integrator: str) -
     return "\n\n".join(texts.values())
 
 
-def step_module(effects: Sequence[Effect], constrained: bool, integrator: str) -> ModuleType:
+def step_module(effects: Sequence[Effect], constrained: bool, integrator: IntegratorName) -> ModuleType:
     """The step module of a scene, written to the kernel cache where it is not there yet, and imported."""
     text = step_source(effects, constrained, integrator)
     name = "step_" + hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -6,7 +6,7 @@ the coordinates theta of q = q0 [+] theta (Munthe-Kaas 1999), a plain vector spa
 
 import math
 
-from physics_prior.dynamics.algebra import cross, plus, scale
+from physics_prior.dynamics.algebra import cross, dot, plus, scale
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import FREE, SPHERICAL
 from physics_prior.dynamics.rotation_vector import exponential, right_jacobian, rotation_back
@@ -14,21 +14,47 @@ from physics_prior.dynamics.types import Array, Records, Vector
 
 
 @inline_kernel
-def local_rate(theta: Vector, omega: Vector) -> Vector:
-    """The rate of the rotation vector theta under body angular velocity omega, to the order RK4 needs.
+def second_coefficient(square: float) -> tuple[float, float]:
+    """The coefficient of theta x (theta x omega) in the inverse right Jacobian, and its slope, by the square of the angle.
 
-    theta_dot = omega + 1/2 theta x omega + 1/12 theta x (theta x omega): the inverse right Jacobian, next term O(theta^4).
+    (1 - a/2 cot a/2) / a^2 (Sola 2017, eq. 184), near zero by its series of Bernoulli numbers.
     """
-    once = cross(theta, omega)
-    return plus(omega, plus(scale(0.5, once), scale(1.0 / 12.0, cross(theta, once))))
+    s = square
+    if s < 0.25:
+        return (
+            1 / 12 + s * (1 / 720 + s * (1 / 30240 + s * (1 / 1209600 + s * (1 / 47900160 + s * 691 / 1307674368000)))),
+            1 / 720 + s * (2 / 30240 + s * (3 / 1209600 + s * (4 / 47900160 + s * 3455 / 1307674368000))),
+        )
+    half = 0.5 * math.sqrt(s)
+    cotangent = math.cos(half) / math.sin(half)
+    value = (1.0 - half * cotangent) / s
+    slope = 0.125 * (half * (1.0 + cotangent * cotangent) - cotangent) / (half * s) - value / s
+    return value, slope
 
 
 @inline_kernel
-def local_rate_by_theta(theta: Vector, omega: Vector, direction: Vector) -> Vector:
+def local_rate(theta: Vector, omega: Vector, exact: bool) -> Vector:
+    """The rate of the rotation vector theta under body angular velocity omega: the inverse right Jacobian times omega.
+
+    theta_dot = omega + 1/2 theta x omega + c theta x (theta x omega); c = 1/12, the next term being O(theta^4), is what methods
+    of order four need.
+    """
+    c = second_coefficient(dot(theta, theta))[0] if exact else 1.0 / 12.0
+    once = cross(theta, omega)
+    return plus(omega, plus(scale(0.5, once), scale(c, cross(theta, once))))
+
+
+@inline_kernel
+def local_rate_by_theta(theta: Vector, omega: Vector, direction: Vector, exact: bool) -> Vector:
     """The derivative of local_rate by theta along a direction."""
     once = cross(theta, omega)
     turned = cross(direction, omega)
-    return plus(scale(0.5, turned), scale(1.0 / 12.0, plus(cross(direction, once), cross(theta, turned))))
+    twice = plus(cross(direction, once), cross(theta, turned))
+    if not exact:
+        return plus(scale(0.5, turned), scale(1.0 / 12.0, twice))
+    c, slope = second_coefficient(dot(theta, theta))
+    change = scale(2.0 * slope * dot(theta, direction), cross(theta, once))
+    return plus(plus(scale(0.5, turned), scale(c, twice)), change)
 
 
 @kernel
@@ -55,8 +81,8 @@ def displace(links: Records, q: Array, delta: Array, out: Array) -> None:
 
 
 @kernel
-def rate(links: Records, theta: Array, v: Array, out: Array) -> None:
-    """Fill out (nv,): the rate of the local coordinates theta (nv,) under velocity v (nv,)."""
+def rate(links: Records, theta: Array, v: Array, exact: bool, out: Array) -> None:
+    """Fill out (nv,): the rate of the local coordinates theta (nv,) under velocity v (nv,), to fourth order or exact."""
     for i in range(links.shape[0]):
         link = links[i]
         n = link.v
@@ -66,14 +92,16 @@ def rate(links: Records, theta: Array, v: Array, out: Array) -> None:
                     out[n + c] = v[n + c]
                 n += 3
             out[n], out[n + 1], out[n + 2] = local_rate(
-                (theta[n], theta[n + 1], theta[n + 2]), (v[n], v[n + 1], v[n + 2])
+                (theta[n], theta[n + 1], theta[n + 2]), (v[n], v[n + 1], v[n + 2]), exact
             )
         else:
             out[n] = v[n]
 
 
 @kernel
-def rate_derivative(links: Records, theta: Array, v: Array, theta_x: Array, v_x: Array, out: Array) -> None:
+def rate_derivative(
+    links: Records, theta: Array, v: Array, theta_x: Array, v_x: Array, exact: bool, out: Array
+) -> None:
     """Fill out (nv, k): the derivative of ``rate`` from those of theta and v, (nv, k) each."""
     columns = out.shape[1]
     for i in range(links.shape[0]):
@@ -87,8 +115,10 @@ def rate_derivative(links: Records, theta: Array, v: Array, theta_x: Array, v_x:
                 n += 3
             angle, omega = (theta[n], theta[n + 1], theta[n + 2]), (v[n], v[n + 1], v[n + 2])
             for j in range(columns):
-                by_theta = local_rate_by_theta(angle, omega, (theta_x[n, j], theta_x[n + 1, j], theta_x[n + 2, j]))
-                by_v = local_rate(angle, (v_x[n, j], v_x[n + 1, j], v_x[n + 2, j]))
+                by_theta = local_rate_by_theta(
+                    angle, omega, (theta_x[n, j], theta_x[n + 1, j], theta_x[n + 2, j]), exact
+                )
+                by_v = local_rate(angle, (v_x[n, j], v_x[n + 1, j], v_x[n + 2, j]), exact)
                 for c in range(3):
                     out[n + c, j] = by_theta[c] + by_v[c]
         else:
@@ -121,3 +151,29 @@ def displacement_derivative(links: Records, theta: Array, start_x: Array, theta_
         else:
             for j in range(columns):
                 out[n, j] = start_x[n, j] + theta_x[n, j]
+
+
+@kernel
+def differential_product(links: Records, theta: Array, matrix: Array, by_theta: bool, out: Array) -> None:
+    """Fill out (n, nv) with a derivative by the tangent at q0 [+] theta, matrix (n, nv), taken by theta, or by that at q0.
+
+    matrix and out may be the same array.
+    """
+    for i in range(links.shape[0]):
+        link = links[i]
+        n = link.v
+        if link.kind == SPHERICAL or link.kind == FREE:
+            if link.kind == FREE:
+                for r in range(matrix.shape[0]):
+                    for c in range(3):
+                        out[r, n + c] = matrix[r, n + c]
+                n += 3
+            angle = (theta[n], theta[n + 1], theta[n + 2])
+            turn = right_jacobian(angle) if by_theta else rotation_back(angle)
+            for r in range(matrix.shape[0]):
+                x, y, z = matrix[r, n], matrix[r, n + 1], matrix[r, n + 2]
+                for c in range(3):
+                    out[r, n + c] = x * turn[c] + y * turn[3 + c] + z * turn[6 + c]
+        else:
+            for r in range(matrix.shape[0]):
+                out[r, n] = matrix[r, n]

@@ -114,6 +114,30 @@ def sections(memory: Array) -> Any:
     )
 
 
+@inline_kernel
+def workspace(memory: Array) -> Array:
+    """Derivatives' own scratch in the memory, of ``tangent_size``, where the integrator needs them in a plain step."""
+    nv, vectors, size = int(memory[4]), int(memory[VECTORS]), int(memory[WORKSPACE])
+    spare = _spare_start(memory)
+    array: Array = carray(address(memory, spare + vectors * nv), size, FLOAT)
+    return array
+
+
+@inline_kernel
+def stage_configuration(memory: Array) -> Array:
+    """A configuration (nq,) of scratch, in the first two vectors beyond SPARE."""
+    nv = int(memory[4])
+    array: Array = carray(address(memory, _spare_start(memory) + SPARE * nv), int(memory[3]), FLOAT)
+    return array
+
+
+@inline_kernel
+def _spare_start(memory: Array) -> int:
+    """Where the vectors of scratch begin."""
+    n, couples, nq = int(memory[0]), int(memory[1]), int(memory[3])
+    return HEAD + n * (LINK_SIZE + WORK_SIZE) + couples * PAIR_SIZE + int(memory[5]) + nq + 2 + nq
+
+
 def tangent_size(n: int, m: int, nv: int, stages: int) -> int:
     """Numbers that derivatives need beside the memory, for n links, m rows, nv degrees of freedom and stages (nv, 2 nv)."""
     matrices = 2 * nv * nv + (nv + 4 * m) * nv + correction_size(m, nv, 2 * nv) + stages * nv * 2 * nv

@@ -217,14 +217,13 @@ def settle(memory: Array, q: Array, v: Array) -> None:
 
 
 @kernel
-def settle_tangent(memory: Array, tangent: Array, q: Array, v: Array, F: Array, G: Array) -> None:
-    """``settle``, and put the columns of F and G (2 nv, 2 nv) onto the constraints' tangent space."""
+def settle_columns(memory: Array, tangent: Array, q: Array, v: Array, F: Array, G: Array) -> None:
+    """Put the columns of F and G (2 nv, 2 nv) onto the constraints' tangent space at q and v, after ``settle``."""
     links, _, _, rows, _, _, _, _ = sections(memory)
     if CONSTRAINED:
         m, nv = row_count(rows), v.shape[0]
         _, matrices, scratch, _, _, _, _ = tangent_sections(tangent, links.shape[0], m, nv)
         A, A_q = matrices[nv : nv + m], matrices[nv + m : nv + 2 * m]
-        settle(memory, q, v)
         tangent_rows(memory, tangent, q, v, A, A_q)
         project_columns(memory, A, A_q, F, scratch, True)
         project_columns(memory, A, A_q, G, scratch, False)

@@ -7,8 +7,8 @@ import numpy as np
 from physics_prior import rotations
 from physics_prior.dynamics import anchor_motion, constraint, kinematics, manifold, newton_euler, projection
 from physics_prior.dynamics.compose import GRAVITY, pack_parameters, step_module
-from physics_prior.dynamics.integrators import DEFAULT, INTEGRATORS, IntegratorName
-from physics_prior.dynamics.memory import SPARE, TIME, Memory, correction_size, tangent_size
+from physics_prior.dynamics.integrators import DEFAULT, INTEGRATORS, TOLERATED, IntegratorName
+from physics_prior.dynamics.memory import SPARE, TIME, TOLERANCE, Memory, correction_size, tangent_size
 from physics_prior.dynamics.records import link_records, motion_tables, moved_freedoms, pair_records
 from physics_prior.dynamics.switches import Switches
 from physics_prior.dynamics.wrench import Wrench
@@ -24,6 +24,8 @@ class Simulator:
 
     State: q (nq,), v (nv,) as Tree says. Methods that move a state do it in place and without allocating.
 
+    tolerance is the error of a step that an adaptive integrator allows, m and rad, m/s and rad/s.
+
     Attributes:
         tree, effects, integrator: what it was built from.
         nq, nv, rows: sizes of configuration, velocity and constraint rows.
@@ -37,7 +39,13 @@ class Simulator:
         ModelError: a joint that moves no inertia; an effect that does not fit the tree.
     """
 
-    def __init__(self, tree: Tree, effects: Sequence[Effect] = (), integrator: IntegratorName = DEFAULT) -> None:
+    def __init__(
+        self,
+        tree: Tree,
+        effects: Sequence[Effect] = (),
+        integrator: IntegratorName = DEFAULT,
+        tolerance: float = TOLERATED,
+    ) -> None:
         if integrator not in INTEGRATORS:
             raise ModelError(f"integrator '{integrator}' is unknown: known are {list(INTEGRATORS)}")
         for effect in effects:
@@ -70,6 +78,7 @@ class Simulator:
             SPARE + needs.vectors,
             self._tangent_size if needs.implicit else 0,
         )
+        memory.array[TOLERANCE] = tolerance
         self.memory = memory
         self._links, self._work, self._pairs = memory.links, memory.work, memory.pairs
         self._gravity = memory.parameters[:GRAVITY]

@@ -8,7 +8,7 @@ from physics_prior.dynamics.constraint import row_count
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.manifold import displace, displacement_derivative, rate, rate_derivative
 from physics_prior.dynamics.memory import TIME, sections, tangent_sections
-from physics_prior.dynamics.motion import differentiate, evaluate, settle, settle_tangent, spread_noise
+from physics_prior.dynamics.motion import differentiate, evaluate, settle, settle_columns, spread_noise
 from physics_prior.dynamics.types import Array
 
 
@@ -27,7 +27,7 @@ def smooth_step(memory: Array, q: Array, v: Array, extra: Array, h: float) -> in
     rank = 0
     for stage in range(4):
         rank = evaluate(memory, q, middle, extra, 0.0, vdot)
-        rate(links, theta, middle, theta_rate)
+        rate(links, theta, middle, False, theta_rate)
         weight = h / 6.0 if stage == 0 or stage == 3 else h / 3.0
         ahead = h if stage == 2 else 0.5 * h
         for k in range(nv):
@@ -85,8 +85,8 @@ def linearise_smooth(
         differentiate(memory, tangent, q, middle, 0.0)
         if stage == 0:
             spread_noise(memory, tangent, force_noise, h, G)
-        rate(links, theta, middle, theta_rate)
-        rate_derivative(links, theta, middle, theta_x, v_x, rate_x)
+        rate(links, theta, middle, False, theta_rate)
+        rate_derivative(links, theta, middle, theta_x, v_x, False, rate_x)
         weight = h / 6.0 if stage == 0 or stage == 3 else h / 3.0
         ahead = h if stage == 2 else 0.5 * h
         accumulate(weight, rate_x, theta_sum_x)
@@ -116,5 +116,6 @@ def linearise_smooth(
         v_sum_x[k, nv + k] += 1.0
     copy(q_x, F[:nv])
     copy(v_sum_x, F[nv:])
-    settle_tangent(memory, tangent, q, v, F, G)
+    settle(memory, q, v)
+    settle_columns(memory, tangent, q, v, F, G)
     return rank

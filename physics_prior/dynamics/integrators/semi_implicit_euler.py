@@ -8,7 +8,7 @@ from physics_prior.dynamics.constraint import row_count
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.manifold import displace, displacement_derivative
 from physics_prior.dynamics.memory import TIME, sections, tangent_sections
-from physics_prior.dynamics.motion import differentiate, evaluate, settle, settle_tangent, spread_noise
+from physics_prior.dynamics.motion import differentiate, evaluate, settle, settle_columns, spread_noise
 from physics_prior.dynamics.types import Array
 
 
@@ -54,5 +54,6 @@ def linearise_smooth(
     displacement_derivative(links, theta, start_x, theta_x, F[:nv])
     displace(links, q, theta, q)
     memory[TIME] += h
-    settle_tangent(memory, tangent, q, v, F, G)
+    settle(memory, q, v)
+    settle_columns(memory, tangent, q, v, F, G)
     return rank

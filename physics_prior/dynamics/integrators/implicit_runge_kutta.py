@@ -64,7 +64,7 @@ def attempt(memory: Array, q: Array, v: Array, extra: Array, h: float) -> tuple[
                     v[k] += D[i] * (V[i, k] - spare[SPARE + 2, k])
             displace(links, start, theta, q)
             return rank, h
-        slow = shrunk > SLOW
+        slow = iteration > 0 and shrunk > SLOW
         before = moved
     return -2, RETRY * h
 

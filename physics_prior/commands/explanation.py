@@ -31,7 +31,7 @@ ROUNDS, STEPS, LINEARISATIONS = 15, 100, 10  # of timing: medians over rounds
 def explain(scene: Scene) -> None:
     """Print everything about a scene; compiles its step where it is not yet."""
     with compiling(scene, "linearise"):
-        simulator = Simulator(scene.tree, scene.effects, scene.step.integrator)
+        simulator = Simulator(scene.tree, scene.effects, scene.step.integrator, scene.step.tolerance)
         state = _state(scene, simulator)
     out = console()
     out.print(scene.name, style="bold")

@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
 
     scene = load_scene(args.scene)
     with compiling(scene, "advance"):
-        simulator = Simulator(scene.tree, scene.effects, scene.step.integrator)
+        simulator = Simulator(scene.tree, scene.effects, scene.step.integrator, scene.step.tolerance)
         simulator.advance(scene.initial.q.copy(), scene.initial.v.copy(), scene.step.size)
     with progress(f"simulating {scene.name}") as report:
         simulate(scene, args.output, args.seed, args.duration, report)

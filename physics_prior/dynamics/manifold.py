@@ -9,27 +9,8 @@ import math
 from physics_prior.dynamics.algebra import cross, dot, plus, scale
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import FREE, SPHERICAL
-from physics_prior.dynamics.rotation_vector import exponential, right_jacobian, rotation_back
+from physics_prior.dynamics.rotation_vector import exponential, right_jacobian, rotation_back, second_coefficient
 from physics_prior.dynamics.types import Array, Records, Vector
-
-
-@inline_kernel
-def second_coefficient(square: float) -> tuple[float, float]:
-    """The coefficient of theta x (theta x omega) in the inverse right Jacobian, and its slope, by the square of the angle.
-
-    (1 - a/2 cot a/2) / a^2 (Sola 2017, eq. 184), near zero by its series of Bernoulli numbers.
-    """
-    s = square
-    if s < 0.25:
-        return (
-            1 / 12 + s * (1 / 720 + s * (1 / 30240 + s * (1 / 1209600 + s * (1 / 47900160 + s * 691 / 1307674368000)))),
-            1 / 720 + s * (2 / 30240 + s * (3 / 1209600 + s * (4 / 47900160 + s * 3455 / 1307674368000))),
-        )
-    half = 0.5 * math.sqrt(s)
-    cotangent = math.cos(half) / math.sin(half)
-    value = (1.0 - half * cotangent) / s
-    slope = 0.125 * (half * (1.0 + cotangent * cotangent) - cotangent) / (half * s) - value / s
-    return value, slope
 
 
 @inline_kernel

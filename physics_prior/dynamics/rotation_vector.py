@@ -60,13 +60,29 @@ def right_jacobian(theta: Vector) -> Matrix:
 
 
 @inline_kernel
+def second_coefficient(square: float) -> tuple[float, float]:
+    """The coefficient of theta x (theta x omega) in the inverse right Jacobian, and its slope, by the square of the angle.
+
+    (1 - a/2 cot a/2) / a^2 (184), near zero by its series of Bernoulli numbers.
+    """
+    s = square
+    if s < 0.25:
+        return (
+            1 / 12 + s * (1 / 720 + s * (1 / 30240 + s * (1 / 1209600 + s * (1 / 47900160 + s * 691 / 1307674368000)))),
+            1 / 720 + s * (2 / 30240 + s * (3 / 1209600 + s * (4 / 47900160 + s * 3455 / 1307674368000))),
+        )
+    half = 0.5 * math.sqrt(s)
+    cotangent = math.cos(half) / math.sin(half)
+    value = (1.0 - half * cotangent) / s
+    slope = 0.125 * (half * (1.0 + cotangent * cotangent) - cotangent) / (half * s) - value / s
+    return value, slope
+
+
+@inline_kernel
 def inverse_right_jacobian(theta: Vector) -> Matrix:
     """The inverse of the right Jacobian (184): the rate of theta per angular velocity in the turned axes."""
     square = theta[0] * theta[0] + theta[1] * theta[1] + theta[2] * theta[2]
-    if square < 1e-6:
-        return _skew_polynomial(theta, 0.5, 1.0 / 12.0 + square / 720.0)
-    half = 0.5 * math.sqrt(square)
-    return _skew_polynomial(theta, 0.5, (1.0 - half * math.cos(half) / math.sin(half)) / square)
+    return _skew_polynomial(theta, 0.5, second_coefficient(square)[0])
 
 
 @inline_kernel

@@ -35,7 +35,7 @@ class Estimator:
 
     def __init__(self, scene: Scene, process: str = "physics", history_length: float = 1.0) -> None:
         self.scene = scene
-        self.simulator = Simulator(scene.tree, scene.effects, scene.step.integrator)
+        self.simulator = Simulator(scene.tree, scene.effects, scene.step.integrator, scene.step.tolerance)
         self.filter = Filter(scene, self.simulator, PROCESSES[process](scene, self.simulator))
         self.history = History(self.filter, round(history_length * 1e9))
         self.last_rejection = ""

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, JsonValue, PlainValidator, model_validator
 
 from physics_prior import rotations
-from physics_prior.dynamics.integrators import DEFAULT, IntegratorName
+from physics_prior.dynamics.integrators import DEFAULT, INTEGRATORS, TOLERATED, IntegratorName
 from physics_prior.errors import ModelError
 from physics_prior.scene.quantity import parse_quantity, quantity
 from physics_prior.scene.section import Section
@@ -153,10 +153,20 @@ class ModelSection(Section):
 
 
 class Step(Section):
-    """Time stepping: the integrator and its step size, s."""
+    """Time stepping: the integrator, its step size, s, and the error that an adaptive one allows each part of a step."""
 
     integrator: IntegratorName = DEFAULT
     size: PositiveTime = 1e-3
+    tolerance: Annotated[Number, Field(ge=1e-14, le=1e-2)] = TOLERATED
+
+    @model_validator(mode="after")
+    def _check_tolerance(self) -> "Step":
+        if "tolerance" in self.model_fields_set and not INTEGRATORS[self.integrator].adaptive:
+            adaptive = [name for name, own in INTEGRATORS.items() if own.adaptive]
+            raise ValueError(
+                f"'tolerance' is not valid: {self.integrator} makes its steps as they are, {adaptive} do not"
+            )
+        return self
 
 
 class Gate(Section):

@@ -9,8 +9,10 @@ from scipy.integrate import solve_ivp
 
 from physics_prior import rotations
 from physics_prior.dynamics.formulations import generalized
-from physics_prior.effects.effect import Anchor, PointPair
-from physics_prior.inertia import MassProperties
+from physics_prior.effects.attachment import Attachment
+from physics_prior.effects.effect import Anchor, Effect, PointPair
+from physics_prior.effects.gravity import Gravity
+from physics_prior.inertia import MassProperties, rod
 from physics_prior.model import Joint, JointKind, Part, Tree
 
 MOVING = (JointKind.REVOLUTE, JointKind.PRISMATIC, JointKind.SPHERICAL)
@@ -216,11 +218,11 @@ def reference() -> Callable[[str], np.ndarray]:
 @pytest.fixture(scope="session")
 def double_pendulum() -> Tree:
     """Two uniform thin rods of 1 m and 1 kg that hang in a row and turn about y; angles from hanging down."""
-    rod = MassProperties(1.0, np.array([0.0, 0.0, -0.5]), np.diag([1.0, 1.0, 0.0]) / 12.0)
+    body = MassProperties(1.0, np.array([0.0, 0.0, -0.5]), np.diag([1.0, 1.0, 0.0]) / 12.0)
     axis = np.array([0.0, -1.0, 0.0])
     hook = Joint("shoulder", JointKind.REVOLUTE, "world", "upper", axis=axis)
     elbow = Joint("elbow", JointKind.REVOLUTE, "upper", "lower", np.array([0.0, 0.0, -1.0]), axis=axis)
-    return Tree([Part("upper", rod), Part("lower", rod)], [hook, elbow])
+    return Tree([Part("upper", body), Part("lower", body)], [hook, elbow])
 
 
 @pytest.fixture(scope="session")
@@ -235,3 +237,19 @@ def free_top() -> Tree:
     """A body with principal moments 1, 2 and 3 kg m^2 that nothing holds."""
     body = MassProperties(1.0, np.zeros(3), np.diag([1.0, 2.0, 3.0]))
     return Tree([Part("top", body)], [Joint("flight", JointKind.FREE, "world", "top")])
+
+
+@pytest.fixture(scope="session")
+def four_bar() -> tuple[Tree, list[Effect], np.ndarray, np.ndarray]:
+    """The four-bar linkage of shared/reference: tree, effects, q and v. Three rods, the verticals upright, pushed at 1 m/s."""
+    body = rod(1.0, 1.0).transformed(np.eye(3), np.array([0.0, 0.0, 0.5]))
+    axis, up = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    joints = [
+        Joint("a", JointKind.REVOLUTE, "world", "left", axis=axis),
+        Joint("b", JointKind.REVOLUTE, "left", "top", up, axis=axis),
+        Joint("c", JointKind.REVOLUTE, "top", "right", up, axis=axis),
+    ]
+    tree = Tree([Part(name, body) for name in ("left", "top", "right")], joints)
+    pin = Attachment(part="right", point=(0.0, 0.0, 1.0), at=(1.0, 0.0, 0.0))
+    field = Gravity(acceleration=(0.0, 0.0, -9.81))
+    return tree, [field, pin], np.array([0.0, np.pi / 2, np.pi / 2]), np.array([1.0, -1.0, 1.0])

@@ -27,7 +27,7 @@ RETRY = 0.25  # a step without solution is taken in parts so much shorter
 def attempt(memory: Array, q: Array, v: Array, extra: Array, h: float) -> tuple[int, float]:
     """Move q (nq,) and v (nv,) in place by h seconds; return the constraints' rank and h.
 
-    Where Newton's method does not converge nothing is moved: then return -2 and a step that may do.
+    Where Newton's method does not converge nothing is moved: then return -2 (-1 if not finite) and a step that may do.
     """
     links, _, _, rows, _, start, spare, _ = sections(memory)
     nv, inner, time = v.shape[0], workspace(memory), memory[TIME]
@@ -46,14 +46,14 @@ def attempt(memory: Array, q: Array, v: Array, extra: Array, h: float) -> tuple[
         if slow:
             factorize_square(slope, pivots)
         solve_square(slope, pivots, change.reshape(-1, 1))
-        moved, scale = 0.0, abs(h)
+        moved, scale = 0.0, abs(h)  # sums, in which what is not a number stays visible
         for i in range(STAGES):
             for k in range(nv):
                 V[i, k] += change[i, k]
-                moved = max(moved, abs(change[i, k]))
-                scale = max(scale, abs(V[i, k]))
+                moved += abs(change[i, k])
+                scale += abs(V[i, k])
         if not math.isfinite(moved + scale):
-            break
+            return -1, RETRY * h
         shrunk = moved / before if iteration > 0 else 1.0
         if moved * shrunk <= ROUNDING * scale or (shrunk > 0.5 and moved <= STALL * scale):
             theta = spare[4]

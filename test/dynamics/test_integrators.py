@@ -58,12 +58,12 @@ def test_order_on_the_double_pendulum(integrator, count, double_pendulum):
     assert order >= INTEGRATORS[integrator].order - 0.2  # measured 1.0, 4.5, 2.0, 2.2, 9.2
 
 
-@pytest.mark.parametrize(("integrator", "count"), COUNTS.items())
+@pytest.mark.parametrize(("integrator", "count"), {**COUNTS, "dop853": 6}.items())
 def test_order_on_a_chain_of_balls(integrator, count, ball_chain):
     """On the manifold of rotations the order is the same."""
     tree, q, v = ball_chain
     order = measured_order(tree, [GRAVITY], integrator, q, v, 0.25, count)
-    assert order >= INTEGRATORS[integrator].order - 0.2  # measured 1.0, 4.1, 2.0, 2.0, XXX
+    assert order >= INTEGRATORS[integrator].order - 0.2  # measured 1.0, 4.1, 2.0, 2.0, 9.4
 
 
 @pytest.mark.parametrize(("integrator", "count"), {**COUNTS, "dop853": 1}.items())

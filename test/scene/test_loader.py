@@ -196,6 +196,7 @@ SLIPS = {
     "constraint: grip": ("constraint: ball", "readouts[3].force.constraint: 'ball' is not a constraint force"),
     "name: turn": ("name: x", "readouts[1].angle.name: 'x' is another readout's name"),
     "semi_implicit_euler": ("euler", "step.integrator: 'euler' is not valid"),
+    "size: 2 ms": ("size: 2 ms, tolerance: 1e-9", "step: 'tolerance' is not valid: semi_implicit_euler"),
     "0.99}": ("1}", "gate.probability: 1 is out of range: give a number < 1"),
     "lost_after: 1 s": ("lost_after: 1 ms", "health: lost_after 0.001 s is too short"),
     "rail: 10 cm": ("rail: 10 deg", "initial.positions.rail: '10 deg' is not a quantity in m"),

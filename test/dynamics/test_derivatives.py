@@ -184,7 +184,7 @@ def test_linearise_makes_the_step_of_advance(random_tree, random_state):
         ("semi_implicit_euler", 5e-3),
         ("implicit_midpoint", 1e-4),
         ("lobatto_iiic", 1e-4),
-        ("dop853", 1e-7),
+        ("dop853", 1e-6),
     ],
 )
 @pytest.mark.parametrize("kind", ["attachment", "hinge", "loop", "rod"])

@@ -8,7 +8,7 @@ from rich.table import Table
 
 from physics_prior.commands.compilation import compiling
 from physics_prior.commands.terminal import console, table
-from physics_prior.dynamics.compose import step_source
+from physics_prior.dynamics.compose import kinds_of_rows, step_source
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.interface import topics_of
 from physics_prior.scene import (
@@ -31,7 +31,7 @@ ROUNDS, STEPS, LINEARISATIONS = 15, 100, 10  # of timing: medians over rounds
 def explain(scene: Scene) -> None:
     """Print everything about a scene; compiles its step where it is not yet."""
     with compiling(scene, "linearise"):
-        simulator = Simulator(scene.tree, scene.effects, scene.step.integrator, scene.step.tolerance)
+        simulator = scene.simulator()
         state = _state(scene, simulator)
     out = console()
     out.print(scene.name, style="bold")
@@ -43,8 +43,8 @@ def explain(scene: Scene) -> None:
 
 def step_text(scene: Scene) -> str:
     """The source of the scene's compiled step."""
-    constrained = any(effect.point_pairs(scene.tree) for effect in scene.effects)
-    return step_source(scene.effects, constrained, scene.step.integrator)
+    constrained, touching = kinds_of_rows(scene.tree, scene.effects)
+    return step_source(scene.effects, constrained, scene.step.integrator, touching)
 
 
 def _model(scene: Scene) -> Table:

@@ -27,13 +27,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Record the bag; 0."""
     from physics_prior.commands.compilation import compiling
-    from physics_prior.dynamics.simulator import Simulator
     from physics_prior.recording.simulate import simulate
     from physics_prior.scene import load_scene
 
     scene = load_scene(args.scene)
     with compiling(scene, "advance"):
-        simulator = Simulator(scene.tree, scene.effects, scene.step.integrator, scene.step.tolerance)
+        simulator = scene.simulator()
         simulator.advance(scene.initial.q.copy(), scene.initial.v.copy(), scene.step.size)
     with progress(f"simulating {scene.name}") as report:
         simulate(scene, args.output, args.seed, args.duration, report)

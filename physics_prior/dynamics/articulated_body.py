@@ -298,10 +298,32 @@ def push(
     that constraints move. y_r . z_s of two forces is their entry of A M^-1 A^T. Entries of ball joints are in world
     axes. The wrench left after a joint moves on to its parent; a force on the world does nothing.
     """
+    if link_index >= 0:
+        moments = rows_crossed(minus(point, get3(work[link_index].origin)), forces)
+        push_wrenches(links, work, link_index, moments, forces, count, y, z)
+
+
+@kernel
+def push_joint(links: Records, work: Records, i: int, force: float, y: Array, z: Array) -> None:
+    """Do as ``push`` with the force or torque of a revolute or prismatic joint; y and z are (1, w)."""
+    link, here = links[i], work[i]
+    share = force * here.D
+    y[0, link.column] += force
+    z[0, link.column] += share
+    if link.parent >= 0:
+        a, b, c = scale(-share, get3(here.U_force))
+        force_left = (a, b, c, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        a, b, c = scale(-share, get3(here.U_moment))
+        moment_left = sum9((a, b, c, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), rows_crossed(get3(here.arm), force_left))
+        push_wrenches(links, work, link.parent, moment_left, force_left, 1, y, z)
+
+
+@kernel
+def push_wrenches(
+    links: Records, work: Records, link_index: int, moments: Matrix, forces: Matrix, count: int, y: Array, z: Array
+) -> None:
+    """Do as ``push`` with wrenches: the first ``count`` rows of moments about the link's origin and of forces."""
     i = link_index
-    if i < 0:
-        return
-    moments = rows_crossed(minus(point, get3(work[i].origin)), forces)
     while i >= 0:
         link, here = links[i], work[i]
         k = link.column

@@ -48,10 +48,18 @@ def section(parameters: Array, index: int) -> Array:
     return parameters[int(parameters[GRAVITY + index]) : int(parameters[GRAVITY + index + 1])]
 
 
-def step_source(effects: Sequence[Effect], constrained: bool, integrator: IntegratorName) -> str:
-    """The text of a scene's step module."""
-    files = INTEGRATORS[integrator].files
-    texts = {name: _text(name) for name in ("motion", *(f"integrators.{file}" for file in files), "step")}
+def kinds_of_rows(tree: Tree, effects: Sequence[Effect]) -> tuple[bool, bool]:
+    """Whether effects give the step equality rows, and inequality rows."""
+    constrained = any(effect.point_pairs(tree) for effect in effects)
+    return constrained, any(effect.touching_pairs(tree) or effect.joint_ranges(tree) for effect in effects)
+
+
+def step_source(
+    effects: Sequence[Effect], constrained: bool, integrator: IntegratorName, touching: bool = False
+) -> str:
+    """The text of a scene's step module, with equality rows or not, and with inequality rows or not."""
+    files = [f"integrators.{file}" for file in INTEGRATORS[integrator].files]
+    texts = {name: _text(name) for name in ("motion", *files, *(["contact.events"] if touching else []), "step")}
     imports = ["from physics_prior.dynamics.compose import section"]
     names: dict[str, str] = {}
     lines: dict[str, list[str]] = {each: [] for each in FUNCTIONS}
@@ -77,12 +85,16 @@ def step_source(effects: Sequence[Effect], constrained: bool, integrator: Integr
         parts = ["\n".join(imports), *(head + body for head, body in zip(heads, bodies, strict=True))]
         texts["motion"] = _replace(texts["motion"], "effects", "\n\n\n".join(parts) + "\n")
     texts["motion"] = _replace(texts["motion"], "constraints", f"CONSTRAINED = {constrained}")
+    if touching:
+        texts["step"] = _replace(texts["step"], "events", "move, linearise_move = event_step, linearise_events")
     return "\n\n".join(texts.values())
 
 
-def step_module(effects: Sequence[Effect], constrained: bool, integrator: IntegratorName) -> ModuleType:
+def step_module(
+    effects: Sequence[Effect], constrained: bool, integrator: IntegratorName, touching: bool = False
+) -> ModuleType:
     """The step module of a scene, written to the kernel cache where it is not there yet, and imported."""
-    text = step_source(effects, constrained, integrator)
+    text = step_source(effects, constrained, integrator, touching)
     name = "step_" + hashlib.sha256(text.encode()).hexdigest()[:16]
     if name in sys.modules:
         return sys.modules[name]

@@ -17,6 +17,7 @@ FASTMATH = {"nsz"}
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
+_CALLBACKS: list[Any] = []  # what must not be collected
 _KERNEL_ROOMS = ("dynamics", "effects", "estimation")
 
 
@@ -54,14 +55,28 @@ def inline_kernel(function: Function) -> Function:
     return _compile(function, inline=True)
 
 
+@cache
+def callback(function: Callable[..., Any], signature: Any) -> int:
+    """Compile a function for calls through its address, and return that; it stays valid while the program runs."""
+    compiled = _in_cache(lambda: numba.cfunc(signature, cache=True, error_model="numpy", fastmath=FASTMATH)(function))
+    _CALLBACKS.append(compiled)
+    return int(compiled.address)
+
+
 def _compile(function: Function, inline: bool) -> Function:
+    compiled: Function = _in_cache(
+        lambda: numba.njit(cache=True, error_model="numpy", fastmath=FASTMATH, forceinline=inline, boundscheck=False)(
+            function
+        )
+    )
+    return compiled
+
+
+def _in_cache(decorate: Callable[[], Any]) -> Any:
     # Numba reads its cache directory when it decorates: set it for our functions only
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(cache_directory())
     try:
-        compiled: Function = numba.njit(
-            cache=True, error_model="numpy", fastmath=FASTMATH, forceinline=inline, boundscheck=False
-        )(function)
-        return compiled
+        return decorate()
     finally:
         numba.config.CACHE_DIR = before

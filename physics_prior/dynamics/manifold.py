@@ -62,6 +62,36 @@ def displace(links: Records, q: Array, delta: Array, out: Array) -> None:
 
 
 @kernel
+def difference(links: Records, start: Array, end: Array, out: Array) -> None:
+    """Fill out (nv,) = end [-] start, configurations (nq,) less than half a turn apart."""
+    for i in range(links.shape[0]):
+        link = links[i]
+        k, n = link.q, link.v
+        if link.kind == SPHERICAL or link.kind == FREE:
+            if link.kind == FREE:
+                for e in range(3):
+                    out[n + e] = end[k + e] - start[k + e]
+                k, n = k + 3, n + 3
+            w, x, y, z = start[k], start[k + 1], start[k + 2], start[k + 3]
+            a, b, c, d = end[k], end[k + 1], end[k + 2], end[k + 3]
+            turn = (
+                w * b - x * a - y * d + z * c,
+                w * c - y * a - z * b + x * d,
+                w * d - z * a - x * c + y * b,
+            )
+            half = math.sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2])
+            cosine = w * a + x * b + y * c + z * d
+            # a quaternion and its negative are one pose
+            angle = 2.0 * math.atan2(half, abs(cosine))
+            factor = angle / half if half > 0.0 else 2.0
+            if cosine < 0.0:
+                factor = -factor
+            out[n], out[n + 1], out[n + 2] = factor * turn[0], factor * turn[1], factor * turn[2]
+        else:
+            out[n] = end[k] - start[k]
+
+
+@kernel
 def rate(links: Records, theta: Array, v: Array, exact: bool, out: Array) -> None:
     """Fill out (nv,): the rate of the local coordinates theta (nv,) under velocity v (nv,), to fourth order or exact."""
     for i in range(links.shape[0]):

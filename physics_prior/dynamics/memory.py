@@ -17,9 +17,10 @@ from physics_prior.dynamics.kernel import inline_kernel
 from physics_prior.dynamics.records import LINK, PAIR, WORK
 from physics_prior.dynamics.types import Array
 
-HEAD = 10
-TIME, TOLERANCE, VECTORS, WORKSPACE = 6, 7, 8, 9
-"""Where the head has the time since the scene's beginning, s, the integrator's tolerance and the sizes of its scratch."""
+HEAD = 11
+TIME, TOLERANCE, VECTORS, WORKSPACE, CONTACT_PART = 6, 7, 8, 9, 10
+"""Where the head has the time since the scene's beginning, s, the integrator's tolerance, the sizes of its scratch, and where
+the part for contacts begins (contact/memory.py)."""
 LINK_SIZE, WORK_SIZE, PAIR_SIZE = LINK.itemsize // 8, WORK.itemsize // 8, PAIR.itemsize // 8
 FREEDOM_SIZE, COMPOSITE_SIZE, GAP_SIZE = FREEDOM.itemsize // 8, COMPOSITE.itemsize // 8, GAP.itemsize // 8
 FLOAT = np.dtype(np.float64)
@@ -36,6 +37,7 @@ class Memory:
         known: (nq + 2,) the configuration whose factors and rows stand in the memory, their rank, and the position error, m,
             that projection may leave there.
         parameters: the numbers of the effects.
+        contact_part: what contacts need (contact/memory.py), empty in a scene without.
 
     vectors (nv,) of scratch, SPARE or more, and the size of ``tangent_memory`` in it are what the integrator needs.
     """
@@ -50,6 +52,7 @@ class Memory:
         nv: int,
         vectors: int = SPARE,
         workspace: int = 0,
+        contact_part: np.ndarray | None = None,
     ) -> None:
         m = int(pairs["rows"].sum())
         sizes = [
@@ -62,16 +65,20 @@ class Memory:
             vectors * nv,
             workspace,
             len(parameters),
+            0 if contact_part is None else len(contact_part),
         ]
         ends = HEAD + np.cumsum([0, *sizes])
         self.array = np.zeros(ends[-1])
         self.array[:6] = len(links), len(pairs), m, nq, nv, sizes[3]
-        self.array[VECTORS], self.array[WORKSPACE] = vectors, workspace
+        self.array[VECTORS], self.array[WORKSPACE], self.array[CONTACT_PART] = vectors, workspace, ends[9]
         own = [self.array[a:b] for a, b in pairwise(ends)]
         self.links, self.work, self.pairs = own[0].view(LINK), own[1].view(WORK), own[2].view(PAIR)
         self.rows = own[3].reshape(m + 3, 2 * width + 2 * m)
         self.known, self.parameters = own[4], own[8]
         self.spare = own[6].reshape(vectors, nv)
+        self.contact_part = own[9]
+        if contact_part is not None:
+            own[9][:] = contact_part
         self.links[:], self.pairs[:], self.parameters[:] = links, pairs, parameters
 
 
@@ -110,7 +117,7 @@ def sections(memory: Array) -> Any:
         carray(address(memory, d), nq + 2, FLOAT),
         carray(address(memory, e), nq, FLOAT),
         carray(address(memory, f), (int(memory[VECTORS]), nv), FLOAT),
-        carray(address(memory, p), memory.shape[0] - p, FLOAT),
+        carray(address(memory, p), int(memory[CONTACT_PART]) - p, FLOAT),
     )
 
 

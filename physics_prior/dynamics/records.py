@@ -1,5 +1,7 @@
 """The model and the workspace as arrays of records: what the kernels read and write, one record a link."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from physics_prior import rotations
@@ -95,10 +97,10 @@ PAIR = np.dtype(
 """One point pair: its constants and what the kernels compute for it."""
 
 
-def link_records(tree: Tree, pairs: np.ndarray) -> np.ndarray:
-    """The tree's moving parts as LINK records (N,), held by PAIR records (P,)."""
+def link_records(tree: Tree, *touched: np.ndarray) -> np.ndarray:
+    """The tree's moving parts as LINK records (N,), held by records with a link_a and a link_b each."""
     records = np.zeros(len(tree.links), dtype=LINK)
-    moved = _moved_links(tree, pairs)
+    moved = _moved_links(tree, touched)
     column = 0
     for i in sorted(range(len(records)), key=lambda i: i not in moved):
         records[i]["column"] = column
@@ -115,9 +117,9 @@ def link_records(tree: Tree, pairs: np.ndarray) -> np.ndarray:
     return records
 
 
-def moved_freedoms(tree: Tree, pairs: np.ndarray) -> int:
-    """Number of degrees of freedom that PAIR records (P,) move: the width of the constraint rows."""
-    return sum(tree.links[i].joint.nv for i in _moved_links(tree, pairs))
+def moved_freedoms(tree: Tree, *touched: np.ndarray) -> int:
+    """Number of degrees of freedom that such records move: the width of the constraint rows."""
+    return sum(tree.links[i].joint.nv for i in _moved_links(tree, touched))
 
 
 def pair_records(tree: Tree, pairs: list[PointPair]) -> np.ndarray:
@@ -147,10 +149,10 @@ def motion_tables(tree: Tree, pairs: list[PointPair], records: np.ndarray, begin
     return np.concatenate(tables)
 
 
-def _moved_links(tree: Tree, pairs: np.ndarray) -> set[int]:
-    """The links between the world and any point of the pairs."""
+def _moved_links(tree: Tree, touched: Sequence[np.ndarray]) -> set[int]:
+    """The links between the world and any that the records touch."""
     moved: set[int] = set()
-    for i in [*pairs["link_a"], *pairs["link_b"]]:
+    for i in [each for records in touched for side in ("link_a", "link_b") for each in records[side]]:
         while i >= 0:
             moved.add(int(i))
             i = tree.links[i].parent

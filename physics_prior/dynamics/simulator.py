@@ -7,6 +7,10 @@ import numpy as np
 from physics_prior import rotations
 from physics_prior.dynamics import anchor_motion, constraint, kinematics, manifold, newton_euler, projection
 from physics_prior.dynamics.compose import GRAVITY, pack_parameters, step_module
+from physics_prior.dynamics.contact import impulse
+from physics_prior.dynamics.contact.memory import candidates_in, contact_memory
+from physics_prior.dynamics.contact.reactions import candidates_by_name, reaction
+from physics_prior.dynamics.contact.records import candidate_records
 from physics_prior.dynamics.integrators import DEFAULT, INTEGRATORS, TOLERATED, IntegratorName
 from physics_prior.dynamics.memory import SPARE, TIME, TOLERANCE, Memory, correction_size, tangent_size
 from physics_prior.dynamics.records import link_records, motion_tables, moved_freedoms, pair_records
@@ -29,8 +33,9 @@ class Simulator:
     Attributes:
         tree, effects, integrator: what it was built from.
         nq, nv, rows: sizes of configuration, velocity and constraint rows.
-        wrench_names: whose wrenches there are: moving joints, then effects that hold something.
+        wrench_names: whose wrenches there are: moving joints, then effects that hold something, then what touches.
         switches: which of these hold now, and what happens when they take hold (switches.py).
+        interval: s, over which impulses of contact are told as forces: the step size.
         step, memory: the compiled step (compose.py) and the array it works in (memory.py).
         rank: rank of the constraint rows at the last evaluation (below ``rows`` where some are redundant: then the motion is
             unique, the split of forces is not).
@@ -45,6 +50,7 @@ class Simulator:
         effects: Sequence[Effect] = (),
         integrator: IntegratorName = DEFAULT,
         tolerance: float = TOLERATED,
+        interval: float = 1e-3,
     ) -> None:
         if integrator not in INTEGRATORS:
             raise ModelError(f"integrator '{integrator}' is unknown: known are {list(INTEGRATORS)}")
@@ -60,7 +66,16 @@ class Simulator:
                 self._labels.append((effect.label, len(pairs), len(pairs) + len(own)))
                 pairs.extend(own)
                 holding.append(effect)
-        self.wrench_names = [link.joint.name for link in tree.links] + [label for label, _, _ in self._labels]
+        touching = [pair for effect in effects for pair in effect.touching_pairs(tree)]
+        ranges = [each for effect in effects for each in effect.joint_ranges(tree)]
+        candidates = candidate_records(tree, ranges, touching)
+        self._touching = candidates_by_name(tree, effects)
+        self.wrench_names = [
+            *(link.joint.name for link in tree.links),
+            *(label for label, _, _ in self._labels),
+            *self._touching,
+        ]
+        self.interval = interval
         self.nq, self.nv = tree.nq, tree.nv
         self.rows = sum(1 if pair.length is not None else len(pair.directions) for pair in pairs)
         self.rank = 0
@@ -68,21 +83,24 @@ class Simulator:
         tables = motion_tables(tree, pairs, records, len(parameters))
         needs = INTEGRATORS[integrator]
         self._tangent_size = tangent_size(len(tree.links), self.rows, self.nv, needs.stages)
+        width = moved_freedoms(tree, records, candidates)
         memory = Memory(
-            link_records(tree, records),
+            link_records(tree, records, candidates),
             records,
-            moved_freedoms(tree, records),
+            width,
             np.concatenate([parameters, tables]),
             self.nq,
             self.nv,
             SPARE + needs.vectors,
             self._tangent_size if needs.implicit else 0,
+            contact_memory(candidates, self.rows, width, self.nq) if len(candidates) else None,
         )
         memory.array[TOLERANCE] = tolerance
         self.memory = memory
         self._links, self._work, self._pairs = memory.links, memory.work, memory.pairs
+        self._candidates = candidates_in(memory.contact_part)
         self._gravity = memory.parameters[:GRAVITY]
-        self.step = step_module(effects, bool(pairs), integrator)
+        self.step = step_module(effects, bool(pairs), integrator, len(candidates) > 0)
         self._rotations, self._origins = self._work["rotation"].reshape(-1, 3, 3), self._work["origin"]
         self._frames: dict[str, tuple[int, np.ndarray, np.ndarray]] = {}
         self._still, self._vdot = np.zeros(self.nv), np.zeros(self.nv)
@@ -275,6 +293,8 @@ class Simulator:
                 out[row, :3] = own["force"].sum(axis=0)
                 if last - first > 1:
                     out[row, 3:] = np.cross(own["b"] - own["b"][0], own["force"]).sum(axis=0)
+            for row, indices in enumerate(self._touching.values(), start=count + len(self._labels)):
+                out[row, :3], out[row, 3:] = reaction(self.tree, self._work, self._candidates[indices])
         else:
             kinematics.move(self._links, self._work, q, v)
             newton_euler.spread(self._links, self._work, vdot, self._gravity)
@@ -287,7 +307,11 @@ class Simulator:
         """``wrench_array`` by name, each with its point."""
         array = self.wrench_array(q, v, vdot)
         constraint.place(self._work, self._pairs)
-        points = [*self._work["origin"], *(self._pairs["b"][first] for _, first, _ in self._labels)]
+        points = [
+            *self._work["origin"],
+            *(self._pairs["b"][first] for _, first, _ in self._labels),
+            *(self._candidates[indices[0]]["point"] for indices in self._touching.values()),
+        ]
         return {
             name: Wrench(row[:3], row[3:], np.array(point))
             for name, row, point in zip(self.wrench_names, array, points, strict=True)
@@ -330,7 +354,14 @@ class Simulator:
         anchor_motion.move_anchors(self._work, self._pairs, self.memory.parameters, self.memory.array[TIME])
 
     def _evaluate(self, q: np.ndarray, v: np.ndarray, extra: np.ndarray, vdot: np.ndarray) -> None:
-        self.rank = self.step.evaluate(self.memory.array, q, v, extra, 0.0, vdot)
+        array, h = self.memory.array, self.interval
+        self.rank = self.step.evaluate(array, q, v, extra, 0.0, vdot)
+        if self._touching:
+            # contact forces are the impulses of a step to come, over its time
+            impulse.resolve(array, q, v + h * vdot, h, False)
+            self.step.evaluate(array, q, v, extra, 0.0, vdot)
+            impulse.load_contacts(array, h)
+            vdot += self.memory.spare[1] / h
         finite = np.isfinite(vdot)
         if not finite.all():
             raise SimulationError(

@@ -1,7 +1,8 @@
 """The step of a scene, compiled: advance and linearise, by the integrator that the scene names.
 
 The composer (dynamics/compose.py) writes it as one module: the scene's equation of motion (motion.py), its integrator
-(integrators/) and this. ``memory`` is that of memory.py; its seventh number is the time, s.
+(integrators/), the events of contact where there is any (contact/events.py), and this. ``memory`` is that of memory.py; its
+seventh number is the time, s.
 """
 
 import math
@@ -9,6 +10,8 @@ import math
 from physics_prior.dynamics.integrators.rk4 import linearise_smooth, smooth_step
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.types import Array
+
+move, linearise_move = smooth_step, linearise_smooth  # scene: events
 
 
 @kernel
@@ -20,7 +23,7 @@ def advance(memory: Array, q: Array, v: Array, extra: Array, h: float, count: in
     """
     rank = 0
     for _ in range(count):
-        rank = smooth_step(memory, q, v, extra, h)
+        rank = move(memory, q, v, extra, h)
         if rank < 0:
             return rank
     total = 0.0
@@ -40,4 +43,4 @@ def linearise(
     F (2 nv, 2 nv): the new error by the old. G (2 nv, 2 nv): a factor of what white generalized forces of density
     force_noise (nv,) [N sqrt(s), N m sqrt(s)] add over the step.
     """
-    return linearise_smooth(memory, tangent, q, v, extra, h, force_noise, F, G)
+    return linearise_move(memory, tangent, q, v, extra, h, force_noise, F, G)

@@ -1,16 +1,17 @@
 """What acts on the body. One effect a file; a scene pays only for the effects it names."""
 
 from physics_prior.effects.attachment import Attachment, Hinge, Rod, Weld
+from physics_prior.effects.contact import Contact
 from physics_prior.effects.drag import Drag
 from physics_prior.effects.effect import Anchor, CompiledForce, Effect, PointPair
 from physics_prior.effects.gravity import Gravity
 from physics_prior.effects.joint_damping import JointDamping
+from physics_prior.effects.joint_limit import JointLimit
 from physics_prior.effects.joint_spring import JointSpring
 from physics_prior.effects.spring import Spring
 
-REGISTRY: dict[str, type[Effect]] = {
-    effect.kind: effect for effect in (Gravity, JointDamping, JointSpring, Spring, Drag, Attachment, Rod, Hinge, Weld)
-}
+_EFFECTS = (Gravity, JointDamping, JointSpring, Spring, Drag, JointLimit, Contact, Attachment, Rod, Hinge, Weld)
+REGISTRY: dict[str, type[Effect]] = {effect.kind: effect for effect in _EFFECTS}
 """Every effect a scene may name, by its key in the scene file."""
 
 __all__ = ["REGISTRY", "Anchor", "CompiledForce", "Effect", "PointPair"]

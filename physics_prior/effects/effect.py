@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from physics_prior import rotations
 from physics_prior.effects.anchor_motion import AnchorMotion
+from physics_prior.effects.touching import JointRange, TouchingPair
 from physics_prior.errors import ModelError
 from physics_prior.model import JointKind, Link, Tree
 
@@ -73,6 +74,7 @@ class Effect(BaseModel):
 
     An effect overrides what it contributes: ``field`` (an acceleration all mass feels), ``compiled`` + ``parameters`` (a
     force), ``point_pairs`` (equality rows). One with equality rows may come and go: ``active_at``, ``switch_times``.
+    force), ``point_pairs`` (equality rows), ``joint_ranges`` and ``touching_pairs`` (inequality rows).
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, allow_inf_nan=False)
@@ -116,6 +118,18 @@ class Effect(BaseModel):
     def switch_times(self) -> tuple[float, ...]:
         """When ``active_at`` changes, s."""
         return ()
+
+    def joint_ranges(self, tree: Tree) -> Sequence[JointRange]:
+        """Joints that it keeps in a range: inequality rows."""
+        return ()
+
+    def touching_pairs(self, tree: Tree) -> Sequence[TouchingPair]:
+        """Surfaces that it keeps apart: inequality rows."""
+        return ()
+
+    def reactions(self, tree: Tree) -> Sequence[str]:
+        """Names of the forces that it publishes: its label where it holds something, unless it says otherwise."""
+        return [self.label] if self.point_pairs(tree) else []
 
 
 def inner_joint(tree: Tree, joint: str, effect: str) -> Link:

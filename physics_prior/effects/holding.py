@@ -51,9 +51,10 @@ class Holding(TwoPoints):
     def _read_at(cls, value: Any) -> Any:
         if value is None or (isinstance(value, str) and value != HERE):
             raise ValueError(f"{value!r} is not valid: give three numbers or '{HERE}'")
-        if value == HERE and not cls.catches:
+        here = isinstance(value, str)
+        if here and not cls.catches:
             raise ValueError(f"'{HERE}' is not valid: a {cls.kind} cannot take hold wherever it is, give three numbers")
-        return None if value == HERE else _as_tuple(value)
+        return None if here else _as_tuple(value)
 
     @field_validator("when", mode="before")
     @classmethod
@@ -106,4 +107,4 @@ def _stamp(time: float) -> int:
 
 
 def _as_tuple(value: Any) -> Any:
-    return tuple(_as_tuple(each) for each in value) if isinstance(value, list) else value
+    return tuple(_as_tuple(each) for each in value) if isinstance(value, list | np.ndarray) else value

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from physics_prior.dynamics.simulator import Simulator
 from physics_prior.errors import MeasurementError, SimulationError
 from physics_prior.estimation.estimate import Counts, Estimate, Health, Level
 from physics_prior.estimation.filter import Filter, Posterior
@@ -35,7 +34,7 @@ class Estimator:
 
     def __init__(self, scene: Scene, process: str = "physics", history_length: float = 1.0) -> None:
         self.scene = scene
-        self.simulator = Simulator(scene.tree, scene.effects, scene.step.integrator, scene.step.tolerance)
+        self.simulator = scene.simulator()
         self.filter = Filter(scene, self.simulator, PROCESSES[process](scene, self.simulator))
         self.history = History(self.filter, round(history_length * 1e9))
         self.last_rejection = ""

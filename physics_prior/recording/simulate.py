@@ -100,7 +100,7 @@ def simulate(
     seed = scene.simulation.seed if seed is None else seed
     duration = scene.simulation.duration if duration is None else duration
     _count(scene, seed, duration)
-    simulator = Simulator(scene.tree, scene.effects, scene.step.integrator, scene.step.tolerance)
+    simulator = scene.simulator()
     truth = Truth(scene, simulator)
     with BagWriter(out) as writer:
         for source in scene.measurements:

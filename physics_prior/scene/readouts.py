@@ -24,7 +24,7 @@ class Subject:
 
     def forces(self) -> list[str]:
         """Names of all constraint forces: of the joints and of the effects that hold something."""
-        held = [effect.label for effect in self.effects if effect.point_pairs(self.tree)]
+        held = [name for effect in self.effects for name in effect.reactions(self.tree)]
         reacting = [link.joint for link in self.tree.links if link.joint.kind is not JointKind.FREE]
         return [joint.name for joint in reacting] + held
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects import Effect
 from physics_prior.model import Tree
 from physics_prior.scene.measurements import MeasurementSource
@@ -71,3 +72,7 @@ class Scene:
     step: Step
     initial: Initial
     simulation: Simulation
+
+    def simulator(self) -> Simulator:
+        """The scene's own compiled step."""
+        return Simulator(self.tree, self.effects, self.step.integrator, self.step.tolerance, self.step.size)

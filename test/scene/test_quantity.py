@@ -99,7 +99,15 @@ def test_units_stated_by_descriptions(description, units):
 
 
 def test_every_number_of_the_built_in_effects_states_its_unit():
-    unitless = {"hinge": {"axis", "to_axis"}, "weld": {"orientation"}}
+    unitless = {
+        "hinge": {"axis", "to_axis"},
+        "weld": {"orientation"},
+        "joint_limit": {"restitution", "restitution_deviation"},
+        "contact": {
+            *("orientation", "to_orientation", "friction", "restitution"),
+            *("friction_deviation", "restitution_deviation"),
+        },
+    }
     for kind, effect in REGISTRY.items():
         for name, field in effect.model_fields.items():
             if "float" in str(field.annotation) and name not in unitless.get(kind, set()):

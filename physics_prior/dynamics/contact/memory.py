@@ -1,0 +1,88 @@
+"""The memory of contacts: the last part of a step's memory, empty in a scene that names none."""
+
+from typing import Any
+
+import numpy as np
+from numba import carray
+
+from physics_prior.dynamics.contact.geometry.pairs import SLOTS
+from physics_prior.dynamics.contact.records import CANDIDATE, CONTACT
+from physics_prior.dynamics.kernel import inline_kernel
+from physics_prior.dynamics.memory import CONTACT_PART, FLOAT, address
+from physics_prior.dynamics.types import Array
+
+HEAD = 8
+CANDIDATE_SIZE, CONTACT_SIZE = CANDIDATE.itemsize // 8, CONTACT.itemsize // 8
+POINT_SIZE = 10  # numbers of a point that the geometry finds
+ASKED = 4  # rows of points that hold what the geometry is asked
+VECTORS = (
+    10  # of the system: bias, kinds, owners, bounds, impulses, scratch (3), velocities, impulses without restitution
+)
+STATES = 12  # configurations and velocities that an event step keeps beside the present ones
+
+
+def contact_memory(candidates: np.ndarray, equalities: int, width: int, nq: int) -> np.ndarray:
+    """The part's array for CANDIDATE records (C,), beside equality rows, over the degrees of freedom that rows move."""
+    contacts = rows = 0
+    for each in candidates:
+        slots = 1 if each["is_limit"] else SLOTS
+        contacts += slots
+        rows += slots * (1 + 2 * (each["friction"] > 0.0) + 2 * (each["rolling"] > 0.0))
+    m = equalities + rows
+    sizes = [
+        len(candidates) * CANDIDATE_SIZE,
+        contacts * CONTACT_SIZE,
+        (SLOTS + ASKED) * POINT_SIZE,
+        2 * m * width,
+        2 * m * m,
+        VECTORS * m,
+        STATES * nq,
+    ]
+    out = np.zeros(HEAD + sum(sizes))
+    out[:5] = len(candidates), contacts, m, width, nq
+    out[HEAD : HEAD + sizes[0]].view(CANDIDATE)[:] = candidates
+    return out
+
+
+def candidates_in(contact_part: np.ndarray) -> np.ndarray:
+    """The CANDIDATE records in the part's array, as a view."""
+    count = int(contact_part[0]) if len(contact_part) else 0
+    return contact_part[HEAD : HEAD + count * CANDIDATE_SIZE].view(CANDIDATE)
+
+
+@inline_kernel
+def contact_sections(memory: Array) -> Any:
+    """The part's sections: candidates, contacts, points, Y and Z (2, m, w), S and scratch (2, m, m), vectors, states."""
+    base = int(memory[CONTACT_PART])
+    n, c, m = int(memory[base]), int(memory[base + 1]), int(memory[base + 2])
+    w, nq = int(memory[base + 3]), int(memory[base + 4])
+    a = base + HEAD
+    b = a + n * CANDIDATE_SIZE
+    d = b + c * CONTACT_SIZE
+    e = d + (SLOTS + ASKED) * POINT_SIZE
+    f = e + 2 * m * w
+    g = f + 2 * m * m
+    h = g + VECTORS * m
+    return (
+        carray(address(memory, a), n, CANDIDATE),
+        carray(address(memory, b), c, CONTACT),
+        carray(address(memory, d), (SLOTS + ASKED, POINT_SIZE), FLOAT),
+        carray(address(memory, e), (2, m, w), FLOAT),
+        carray(address(memory, f), (2, m, m), FLOAT),
+        carray(address(memory, g), (VECTORS, m), FLOAT),
+        carray(address(memory, h), (STATES, nq), FLOAT),
+    )
+
+
+@inline_kernel
+def remember(memory: Array, count: int, rows: int) -> None:
+    """Keep how many contacts there are, and rows of the system with them."""
+    base = int(memory[CONTACT_PART])
+    memory[base + 5], memory[base + 6] = count, rows
+
+
+@inline_kernel
+def remembered(memory: Array) -> tuple[int, int]:
+    """Return how many contacts there were, and rows of the system with them."""
+    base = int(memory[CONTACT_PART])
+    return int(memory[base + 5]), int(memory[base + 6])

@@ -23,6 +23,7 @@ from physics_prior.scene import (
     PoseSource,
     Readout,
     Scene,
+    SwitchSource,
 )
 
 ROUNDS, STEPS, LINEARISATIONS = 15, 100, 10  # of timing: medians over rounds
@@ -90,6 +91,8 @@ def _measured(source: MeasurementSource) -> tuple[str, str]:
             return f"{len(source.markers)} markers", f"{source.noise * 1e3:.3g} mm"
         case JointSource():
             return f"joints {', '.join(source.joints.values())}", f"{source.noise:.3g}"
+        case SwitchSource():
+            return f"force of {source.effect}", f"on above {source.above:.3g} N, off below {source.below:.3g} N"
     raise AssertionError(f"{type(source).__name__} is not described")
 
 

@@ -38,7 +38,7 @@ def project(
     configuration nearby, which the workspace must hold, serve q as long as they make e ten times smaller (simplified
     Newton's method); the velocity has those of the final q, and the next step finds them there. spare (2, nv).
     """
-    nv, right = v.shape[0], rows[row_count(rows)]
+    right = rows[row_count(rows)]
     before, exact = math.inf, False
     pose(links, work, q)
     place(work, pairs)
@@ -59,10 +59,16 @@ def project(
         place(work, pairs)
         error = position_error(pairs, right)
     complete(links, work, pairs, rows, known, q)
+    project_velocity(links, work, pairs, rows, v, spare)
+    return error
+
+
+@kernel
+def project_velocity(links: Records, work: Records, pairs: Records, rows: Array, v: Array, spare: Array) -> None:
+    """Put v (nv,) onto the constraints by the impulse that takes it there (design eq. 9); needs factors and rows of q."""
     flow(links, work, v)
-    velocity_error(work, pairs, right)
+    velocity_error(work, pairs, rows[row_count(rows)])
     multiply(rows)
     respond(links, work, rows, spare[0], spare[1])
-    for k in range(nv):
+    for k in range(v.shape[0]):
         v[k] += spare[1, k]
-    return error

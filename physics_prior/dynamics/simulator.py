@@ -165,6 +165,14 @@ class Simulator:
         constraint.refresh(*system)
         return float(projection.project(*system, v, own.spare, constraint.ROUNDING))
 
+    def project_velocity(self, q: np.ndarray, v: np.ndarray) -> None:
+        """Put v onto the constraints in place, as they are at q, in the mass metric."""
+        if self.rows:
+            own = self.memory
+            self._move_anchors()
+            constraint.refresh(own.links, own.work, own.pairs, own.rows, own.known, q)
+            projection.project_velocity(own.links, own.work, own.pairs, own.rows, v, own.spare)
+
     def switch(self, label: str, on: bool, q: np.ndarray, v: np.ndarray) -> dict[str, Wrench]:
         """Have an effect take hold or let go at q and v, which are put in place onto all that holds then; return the impulses.
 

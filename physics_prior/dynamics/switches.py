@@ -67,9 +67,7 @@ class Switches:
         self._holds = tuple(Hold(True) for _ in effects)
         for index, (first, last) in enumerate(spans):
             simulator.memory.pairs["here"][first:last] = self._here(index)
-        self.holds = tuple(
-            Hold(effect.active_at(0.0) and not self._here(index)) for index, effect in enumerate(self.effects)
-        )
+        self.holds = self.told([effect.active_at(0.0) for effect in self.effects])
         events = [
             Event(round(time * 1e9), index, effect.active_at(time))
             for index, effect in enumerate(self.effects)
@@ -90,10 +88,21 @@ class Switches:
         self._holds = tuple(holds)
 
     @property
+    def holding(self) -> tuple[str, ...]:
+        """The names of the effects that hold now."""
+        return tuple(label for label, hold in zip(self.labels, self._holds, strict=True) if hold.active)
+
+    @property
     def rows(self) -> int:
         """The number of rows that act now."""
         pairs = self._simulator.memory.pairs
         return int(pairs["rows"] @ pairs["active"]) if len(pairs) else 0
+
+    def row_span(self, index: int) -> slice:
+        """The rows of an effect among those of the constraints."""
+        first, last = self.spans[index]
+        pairs = self._simulator.memory.pairs
+        return slice(int(pairs["first"][first]), int(pairs["first"][last - 1] + pairs["rows"][last - 1]))
 
     def stretches(self, begin: int, end: int) -> Iterator[Stretch]:
         """The stretches of a time, in order; its own end is the last one's, and what switches then belongs to it."""
@@ -127,6 +136,10 @@ class Switches:
         holds = list(self._holds)
         holds[index] = Hold(on, self._place(index, q) if on and self._here(index) else ())
         return tuple(holds)
+
+    def told(self, active: Sequence[bool]) -> tuple[Hold, ...]:
+        """What holds if these do, but for those that hold wherever their part is: these have not taken hold yet."""
+        return tuple(Hold(on and not self._here(index)) for index, on in enumerate(active))
 
     def recaught(self, q: np.ndarray) -> tuple[Hold, ...]:
         """What holds, with the anchors of those that hold wherever their parts were moved to where these are at q."""

@@ -61,6 +61,8 @@ class Estimate:
         health: how far to trust all this.
         nis: normalised innovation squared of the measurements at this stamp, and its expectation (their dimension);
             zeros where the stamp has none.
+        rows: how many constraint rows act.
+        holding: the effects that hold something now.
     """
 
     stamp: int
@@ -75,6 +77,8 @@ class Estimate:
     rank: int
     health: Health
     nis: tuple[float, int] = (0.0, 0)
+    rows: int = 0
+    holding: tuple[str, ...] = ()
     counts: Counts = field(default_factory=Counts)
 
     @property

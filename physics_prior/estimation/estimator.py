@@ -10,9 +10,10 @@ from physics_prior.errors import MeasurementError, SimulationError
 from physics_prior.estimation.estimate import Counts, Estimate, Health, Level
 from physics_prior.estimation.filter import Filter, Posterior
 from physics_prior.estimation.history import START_WINDOW, History, Node
-from physics_prior.estimation.measurement import Measurement
+from physics_prior.estimation.measurement import Measurement, SwitchCommand, command_topic
 from physics_prior.estimation.process import PROCESSES
 from physics_prior.estimation.start import start
+from physics_prior.estimation.switching import active_at_start
 from physics_prior.scene import Scene
 
 JUMP_AFTER = 5  # measurements in a row that find no place: the clock has jumped (a looped bag)
@@ -41,6 +42,7 @@ class Estimator:
         self._read = self._late = self._rejected = 0
         self._dropped = Counts()
         self.on_settled: Callable[[Node], None] = lambda node: None
+        self._begun: int | None = None  # stamp of the first measurement: the scene's time zero
         self._early: list[Measurement] = []  # before the start and what it was made from
         self._stale: list[Measurement] = []
 
@@ -66,7 +68,7 @@ class Estimator:
         for node in self.history.nodes:
             self._settle(node)
         self.history = History(self.filter, self.history.length)
-        self._early, self._stale = [], []
+        self._early, self._stale, self._begun = [], [], None
 
     def reject(self, why: str) -> None:
         """Count a message that could not be made a measurement, and say why."""
@@ -84,6 +86,14 @@ class Estimator:
             self.last_rejection = str(problem)
             return False
         return self._take(measurement)
+
+    def switch(self, effect: str, on: bool, stamp: int) -> bool:
+        """Have an effect that holds something take hold or let go at a stamp, ns; return whether the newest estimate changed.
+
+        A command has its place in the history as a measurement has, before those of its stamp: it may come late. Other
+        commands, the schedule and measured forces after it hold as well: the last word counts.
+        """
+        return self.add(SwitchCommand(stamp, command_topic(effect), effect, on))
 
     def estimate(self, stamp: int | None = None) -> Estimate:
         """The newest estimate, or what it predicts for a later stamp, ns.
@@ -106,6 +116,7 @@ class Estimator:
     def describe(self, posterior: Posterior) -> Estimate:
         """The estimate that a posterior stands for: forces and their uncertainty, and its health."""
         simulator, nv, state = self.simulator, self.simulator.nv, posterior.state
+        self.filter.enter(posterior)
         by_physics = len(state.acceleration) == 0
         wrenches = simulator.wrenches(state.q, state.v, None if by_physics else state.acceleration)
         effort = simulator.effort if by_physics else np.zeros(nv)
@@ -127,6 +138,8 @@ class Estimator:
             rank=rank,
             health=self.health_of(posterior, posterior.stamp),
             nis=(posterior.nis, posterior.dimension),
+            rows=simulator.switches.rows,
+            holding=simulator.switches.holding,
         )
 
     def _wrench_deviations(self, posterior: Posterior) -> np.ndarray:
@@ -154,6 +167,8 @@ class Estimator:
             return Health(Level.LOST, f"no measurement was accepted for {age:.1f} s")
         if age > self.scene.health.degraded_after:
             return Health(Level.DEGRADED, f"no measurement was accepted for {age:.2f} s: the state is predicted")
+        if posterior.trouble:
+            return Health(Level.DEGRADED, posterior.trouble)
         if posterior.refused >= STREAK:
             return Health(Level.DEGRADED, f"the gate refused the last {posterior.refused} measurements")
         return Health(Level.OK)
@@ -164,6 +179,8 @@ class Estimator:
             return self._set_aside(measurement, misplaced)
         self._stale.clear()
         self._late += measurement.stamp < self._newest
+        if not isinstance(measurement, SwitchCommand):
+            self._begun = min(measurement.stamp, measurement.stamp if self._begun is None else self._begun)
         try:
             changed = self._put(measurement)
         except SimulationError as problem:
@@ -220,15 +237,19 @@ class Estimator:
         if self.history or (complete and self._start(stamp)):
             self.history.insert(measurement)
             return
-        self._early = [each for each in self._early if each.stamp > measurement.stamp - START_WINDOW]
+        oldest = measurement.stamp - START_WINDOW
+        last_words = {each.topic: each for each in self._early if not self.filter.observes(each)}
+        self._early = [each for each in self._early if each.stamp > oldest or last_words.get(each.topic) is each]
         insort(self._early, measurement, key=self.filter.key)
 
     def _start(self, stamp: int) -> bool:
         """Start from the waiting measurements at a stamp, or from the newest of every topic about it."""
         together = [each for each in self._early if each.stamp == stamp]
         newest = {each.topic: each for each in self._early}
+        begun = stamp if self._begun is None else self._begun
+        active = active_at_start(self.filter, begun, stamp, self._early)
         for chosen in (together, list(newest.values())):
-            posterior = start(self.filter, chosen, stamp)
+            posterior = start(self.filter, chosen, stamp, begun, active)
             if posterior is not None:
                 self.history.begin([each for each in chosen if each.stamp == stamp], posterior)
                 self._early = [each for each in self._early if each.stamp < stamp]

@@ -10,8 +10,10 @@ import numpy as np
 from scipy.stats import chi2
 
 from physics_prior.dynamics.simulator import Simulator
+from physics_prior.dynamics.switches import Hold
 from physics_prior.errors import MeasurementError, SimulationError
-from physics_prior.estimation.measurement import Measurement
+from physics_prior.estimation import switching
+from physics_prior.estimation.measurement import ForceMeasurement, Measurement, SwitchCommand, command_topic
 from physics_prior.estimation.observation import Innovation, check, innovation
 from physics_prior.estimation.process import Process, State, steps
 from physics_prior.estimation.square_root import innovate, predict_factor
@@ -34,6 +36,9 @@ class Posterior:
         used: whether the last one was believed; None where it said nothing or did not fit.
         nis: its normalised innovation squared; dimension: what that is expected to be.
         start: whether it is a (re)start from measurements alone.
+        begun: stamp of the scene's time zero, ns.
+        holds: what holds, effect by effect of those that can.
+        trouble: why the last effect that was to take hold does not; empty if it does.
     """
 
     stamp: int
@@ -45,6 +50,9 @@ class Posterior:
     nis: float = 0.0
     dimension: int = 0
     start: bool = False
+    begun: int = 0
+    holds: tuple[Hold, ...] = ()
+    trouble: str = ""
 
 
 class Filter:
@@ -58,13 +66,25 @@ class Filter:
     def __init__(self, scene: Scene, simulator: Simulator, process: Process) -> None:
         self.scene, self.simulator, self.process = scene, simulator, process
         self.sources: dict[str, MeasurementSource] = {source.topic: source for source in scene.measurements}
-        self.order = {topic: index for index, topic in enumerate(self.sources)}
+        labels = simulator.switches.labels
+        commands = {command_topic(label): index - len(labels) for index, label in enumerate(labels)}
+        self.order = commands | {topic: index for index, topic in enumerate(self.sources)}
         self._limits: dict[int, float] = {}
 
     def predict(self, posterior: Posterior, stamp: int) -> Posterior:
         """The posterior carried to a later stamp, ns; SimulationError if the motion leaves the numbers."""
         if stamp <= posterior.stamp:
             return posterior
+        begun = posterior.begun
+        for stretch in self.simulator.switches.stretches(posterior.stamp - begun, stamp - begun):
+            posterior = self._carry(posterior, begun + stretch.end)
+            for event in stretch.events:
+                posterior = switching.switch(self, posterior, event.index, event.on)
+        return posterior
+
+    def _carry(self, posterior: Posterior, stamp: int) -> Posterior:
+        """``predict`` where nothing switches on the way."""
+        self.enter(posterior)
         count, h = steps((stamp - posterior.stamp) * 1e-9, self.scene.step.size)
         state, factor = posterior.state.copy(), posterior.factor.copy()
         W: np.ndarray | None = None
@@ -79,15 +99,27 @@ class Filter:
             )
         return replace(posterior, stamp=stamp, state=state, factor=factor, used=None, nis=0.0, dimension=0, start=False)
 
+    def enter(self, posterior: Posterior) -> None:
+        """Have the simulator hold what the posterior holds, at its time."""
+        self.simulator.switches.holds = posterior.holds
+        self.simulator.time = (posterior.stamp - posterior.begun) * 1e-9
+
     def key(self, measurement: Measurement) -> tuple[int, int]:
         """What measurements are ordered by: their stamp, and where it is the same, their topic's place in the scene."""
         return measurement.stamp, self.order[measurement.topic]
 
     def check(self, measurement: Measurement) -> None:
         """Raise MeasurementError if a measurement does not fit its source."""
+        if isinstance(measurement, SwitchCommand) and measurement.topic in self.order:
+            return
         if measurement.topic not in self.sources:
             raise MeasurementError(f"topic '{measurement.topic}' is not measured: the scene reads {list(self.sources)}")
         check(self.sources[measurement.topic], measurement)
+
+    @staticmethod
+    def observes(measurement: Measurement) -> bool:
+        """Whether a measurement is of the configuration; the others tell what holds."""
+        return not isinstance(measurement, SwitchCommand | ForceMeasurement)
 
     def innovation(self, measurement: Measurement, state: State) -> Innovation:
         """The measurement, which must fit its source, against a state."""
@@ -106,6 +138,10 @@ class Filter:
         Iterated (Gauss-Newton, Bell and Cathey 1993) where the correction is too large for one linearisation.
         """
         prior = replace(prior, used=None, nis=0.0, dimension=0, start=False)
+        if not self.observes(measurement):
+            active = [hold.active for hold in prior.holds]
+            return switching.switch(self, prior, *switching.decision(self, measurement, active))
+        self.enter(prior)
         seen = self.innovation(measurement, prior.state)
         m, n = len(seen.y), len(prior.factor)
         if m == 0:
@@ -129,10 +165,25 @@ class Filter:
         factor = np.ascontiguousarray(W[m:, m:])
         self.constrain(state, factor)
         return replace(
-            prior, state=state, factor=factor, accepted=prior.stamp, refused=0, used=True, nis=nis, dimension=m
+            prior,
+            state=state,
+            factor=factor,
+            accepted=prior.stamp,
+            refused=0,
+            used=True,
+            nis=nis,
+            dimension=m,
+            holds=self.simulator.switches.holds,
         )
 
+    @property
+    def constrained(self) -> bool:
+        """Whether there are constraints that the process knows."""
+        return self.simulator.rows > 0 and self.process.n == 2 * self.simulator.nv
+
     def constrain(self, state: State, factor: np.ndarray) -> None:
-        """Put state and covariance onto the constraints, where the process knows them."""
-        if self.simulator.rows and self.process.n == 2 * self.simulator.nv:
+        """Put state and covariance onto what the simulator holds; what holds its part wherever it is moves with it."""
+        if self.constrained:
+            switches = self.simulator.switches
+            switches.holds = switches.recaught(state.q)
             self.simulator.constrain(state.q, state.v, factor)

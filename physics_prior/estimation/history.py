@@ -98,4 +98,10 @@ class History:
                 break
             newest.setdefault(node.measurement.topic, node.measurement)
         together = [each for each in newest.values() if each.stamp == stamp]
-        return start(self.filter, together, stamp) or start(self.filter, list(newest.values()), stamp)
+        prior = self.nodes[index].prior
+        active = [hold.active for hold in self.nodes[index].posterior.holds]
+        for chosen in (together, list(newest.values())):
+            posterior = start(self.filter, chosen, stamp, prior.begun, active)
+            if posterior is not None:
+                return posterior
+        return None

@@ -79,6 +79,29 @@ class JointsMeasurement(Measurement):
         _set(self, "positions", _finite("positions", self.positions, (len(self.names),)))
 
 
+@dataclass(frozen=True, eq=False)
+class ForceMeasurement(Measurement):
+    """A force (3,) N by which what holds something is felt, in any axes: its size tells whether it does."""
+
+    force: np.ndarray
+
+    def __post_init__(self) -> None:
+        _set(self, "force", _finite("force", self.force, (3,)))
+
+
+@dataclass(frozen=True, eq=False)
+class SwitchCommand(Measurement):
+    """An effect that holds something is told to take hold or to let go; its topic is ``command_topic`` of the effect."""
+
+    effect: str
+    on: bool
+
+
+def command_topic(effect: str) -> str:
+    """The topic under which commands to an effect stand among measurements."""
+    return f"effects/{effect}"
+
+
 def _set(target: object, name: str, value: object) -> None:
     object.__setattr__(target, name, value)
 

@@ -8,6 +8,7 @@ from physics_prior import rotations
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.errors import MeasurementError
 from physics_prior.estimation.measurement import (
+    ForceMeasurement,
     JointsMeasurement,
     Measurement,
     OrientationMeasurement,
@@ -15,7 +16,14 @@ from physics_prior.estimation.measurement import (
     PoseMeasurement,
 )
 from physics_prior.model import JointKind
-from physics_prior.scene import JointSource, MeasurementSource, OrientationSource, PointsSource, PoseSource
+from physics_prior.scene import (
+    JointSource,
+    MeasurementSource,
+    OrientationSource,
+    PointsSource,
+    PoseSource,
+    SwitchSource,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +46,7 @@ FITS = {
     OrientationSource: OrientationMeasurement,
     PointsSource: PointsMeasurement,
     JointSource: JointsMeasurement,
+    SwitchSource: ForceMeasurement,
 }
 """Which measurement each kind of source brings."""
 

@@ -9,10 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from physics_prior.dynamics.switches import Hold
 from physics_prior.estimation.filter import Filter, Posterior
 from physics_prior.estimation.history import Node
 from physics_prior.estimation.process import State, steps
-from physics_prior.estimation.square_root import predict_factor, triangularise
+from physics_prior.estimation.square_root import deviations, predict_factor, triangularise
+from physics_prior.estimation.switching import Grip, switch, take_hold
 
 NANOSECONDS = 1e9
 INVERTIBLE = 1e-9  # of the largest singular value: smaller ones belong to directions that the constraints forbid
@@ -20,9 +22,10 @@ INVERTIBLE = 1e-9  # of the largest singular value: smaller ones belong to direc
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One step of the prediction: where it began, how it went and where it was to end."""
+    """One step of the prediction: where it began, how it went and where it was to end; or how something took hold."""
 
     stamp: int
+    holds: tuple[Hold, ...]
     state: State
     factor: np.ndarray
     F: np.ndarray
@@ -37,9 +40,13 @@ def smooth(filter: Filter, nodes: Sequence[Node], period: float) -> list[Posteri
     nodes: all nodes of a recording in order, as the history rolled them. The chain is cut where the filter started anew.
     """
     last: dict[int, Posterior] = {}  # the last posterior at a stamp knows all that was measured then
+    grips: dict[int, list[Step]] = {}  # of commands and measured forces at a stamp
     restarts = set()
     for node in nodes:
         last[node.measurement.stamp] = node.posterior
+        taken = _taken(node)
+        if taken is not None:
+            grips.setdefault(node.measurement.stamp, []).append(_gripped(filter, node.prior, taken))
         if node.posterior.start:
             restarts.add(node.measurement.stamp)
     stamps = list(last)
@@ -53,32 +60,57 @@ def smooth(filter: Filter, nodes: Sequence[Node], period: float) -> list[Posteri
             out.append(later)
             continue
         state, factor = later.state, later.factor
-        for step in reversed(_steps(filter, last[own], after)):
-            state, factor = _back(filter, step, state, factor)
-            later = replace(last[own], stamp=step.stamp, state=state, factor=factor)
+        for step in reversed([*_steps(filter, last[own], after), *grips.get(after, [])]):
+            state, factor, holds = _back(filter, step, last[own].begun, state, factor)
+            later = replace(last[own], stamp=step.stamp, state=state, factor=factor, holds=holds)
             if step.stamp == own or out[-1].stamp - step.stamp >= period * NANOSECONDS:
                 out.append(later)
     return out[::-1]
 
 
+def _taken(node: Node) -> int | None:
+    """Which effect took hold at a node, by a command or a measured force; None if none did."""
+    for index, (before, after) in enumerate(zip(node.prior.holds, node.posterior.holds, strict=True)):
+        if after.active and not before.active:
+            return index
+    return None
+
+
 def _steps(filter: Filter, posterior: Posterior, stamp: int) -> list[Step]:
-    """The steps by which the filter carried a posterior to a later stamp."""
-    count, h = steps((stamp - posterior.stamp) / NANOSECONDS, filter.scene.step.size)
-    state, factor = posterior.state, posterior.factor
-    out = []
-    for index in range(count):
-        predicted, predicted_factor = state.copy(), factor.copy()
-        F, G = filter.process.advance(predicted, h)
-        predict_factor(F, predicted_factor, G, np.empty((len(F), len(F) + G.shape[1])))
-        began = posterior.stamp + round(index * h * NANOSECONDS)
-        out.append(Step(began, state, factor, F, G, predicted, predicted_factor))
-        state, factor = predicted, predicted_factor
+    """The steps by which the filter carried a posterior to a later stamp, scheduled switching included."""
+    out, begun = [], posterior.begun
+    for stretch in filter.simulator.switches.stretches(posterior.stamp - begun, stamp - begun):
+        filter.enter(posterior)
+        count, h = steps((stretch.end - stretch.begin) / NANOSECONDS, filter.scene.step.size)
+        state, factor = posterior.state, posterior.factor
+        for index in range(count):
+            predicted, predicted_factor = state.copy(), factor.copy()
+            F, G = filter.process.advance(predicted, h)
+            predict_factor(F, predicted_factor, G, np.empty((len(F), len(F) + G.shape[1])))
+            began = posterior.stamp + round(index * h * NANOSECONDS)
+            out.append(Step(began, posterior.holds, state, factor, F, G, predicted, predicted_factor))
+            state, factor = predicted, predicted_factor
+        posterior = replace(posterior, stamp=begun + stretch.end, state=state, factor=factor)
+        for event in stretch.events:
+            switched = switch(filter, posterior, event.index, event.on)
+            if event.on and switched.holds != posterior.holds:
+                out.append(_gripped(filter, posterior, event.index))
+            posterior = switched
     return out
 
 
-def _back(filter: Filter, step: Step, state: State, factor: np.ndarray) -> tuple[State, np.ndarray]:
-    """The smoothed state and factor at a step's beginning from those at its end."""
-    scale = np.sqrt(np.maximum(np.sum(step.predicted_factor**2, axis=1), 1e-300))
+def _gripped(filter: Filter, posterior: Posterior, index: int) -> Step:
+    """How an effect took hold, as a step of no duration and without noise."""
+    grip: Grip = take_hold(filter, posterior, index)
+    G = np.zeros_like(grip.F)
+    return Step(posterior.stamp, posterior.holds, grip.state, grip.factor, grip.F, G, grip.after, grip.factor_after)
+
+
+def _back(
+    filter: Filter, step: Step, begun: int, state: State, factor: np.ndarray
+) -> tuple[State, np.ndarray, tuple[Hold, ...]]:
+    """The smoothed state and factor at a step's beginning from those at its end, and what held there."""
+    scale = deviations(step.predicted_factor)
     inverse = np.linalg.pinv(step.predicted_factor / scale[:, None], rcond=INVERTIBLE) / scale
     gain = step.factor @ (step.F @ step.factor).T @ inverse.T @ inverse
     n = len(gain)
@@ -86,5 +118,7 @@ def _back(filter: Filter, step: Step, state: State, factor: np.ndarray) -> tuple
     triangularise(W)
     smoothed = filter.process.displace(step.state, gain @ filter.process.difference(step.predicted, state))
     out = np.ascontiguousarray(W[:, :n])
+    filter.simulator.switches.holds = step.holds
+    filter.simulator.time = (step.stamp - begun) / NANOSECONDS
     filter.constrain(smoothed, out)
-    return smoothed, out
+    return smoothed, out, filter.simulator.switches.holds

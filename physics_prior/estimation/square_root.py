@@ -11,6 +11,8 @@ import numpy as np
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.types import Array
 
+ROUNDING = 1e-10  # of the largest standard deviation: below it, another is that of a direction that constraints forbid
+
 
 @kernel
 def triangularise(W: Array) -> None:
@@ -96,9 +98,15 @@ def innovate(S: Array, H: Array, noise: Array, W: Array, whitened: Array, y: Arr
     return nis
 
 
+def deviations(S: np.ndarray) -> np.ndarray:
+    """(n,) standard deviations of a factor S (n, n), to scale by: none less than rounding makes of the largest."""
+    own = np.sqrt(np.sum(S * S, axis=1))
+    return np.asarray(np.maximum(own, max(ROUNDING * float(np.max(own)), 1e-300)))
+
+
 def normalised_error(S: np.ndarray, error: np.ndarray) -> tuple[float, int]:
     """Normalised estimation error squared of an error (n,) and its degrees of freedom, the rank of the factor S (n, n)."""
-    scale = np.sqrt(np.maximum(np.sum(S * S, axis=1), 1e-300))
+    scale = deviations(S)
     U, s, _ = np.linalg.svd(S / scale[:, None])
     rank = int(np.sum(s > 1e-7 * s[0]))
     return float(np.sum((U[:, :rank].T @ (error / scale) / s[:rank]) ** 2)), rank

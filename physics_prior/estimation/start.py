@@ -8,6 +8,7 @@ from scipy.stats import chi2
 from physics_prior.estimation.filter import Filter, Posterior
 from physics_prior.estimation.measurement import Measurement
 from physics_prior.estimation.square_root import triangularise
+from physics_prior.estimation.switching import switch
 from physics_prior.model import JointKind, Tree
 
 ITERATIONS = 30
@@ -18,13 +19,24 @@ TRIES = 6  # starting configurations: the scene's own, then random ones (always 
 SPREAD = 1.0  # rad or m
 
 
-def start(filter: Filter, measurements: Sequence[Measurement], stamp: int) -> Posterior | None:
+def start(
+    filter: Filter,
+    measurements: Sequence[Measurement],
+    stamp: int,
+    begun: int | None = None,
+    active: Sequence[bool] | None = None,
+) -> Posterior | None:
     """A posterior at a stamp (ns) from measurements taken as simultaneous; None if they do not fix the configuration.
 
     Gauss-Newton from several configurations; the best must fit all measurements within the gate's probability. The
-    velocity is zero with the scene's standard deviation.
+    velocity is zero with the scene's standard deviation. begun (ns): the scene's time zero, the stamp where left out;
+    active: what holds, as scheduled where left out.
     """
-    simulator = filter.simulator
+    simulator, measurements = filter.simulator, [each for each in measurements if filter.observes(each)]
+    begun = stamp if begun is None else begun
+    if active is None:
+        active = [effect.active_at((stamp - begun) * 1e-9) for effect in simulator.switches.effects]
+    _enter_start(filter, stamp, begun, active)
     rng = np.random.default_rng(0)
     best: tuple[float, np.ndarray, np.ndarray, int] | None = None
     for trial in range(TRIES):
@@ -39,11 +51,25 @@ def start(filter: Filter, measurements: Sequence[Measurement], stamp: int) -> Po
     if best is None or not _plausible(filter, best[0], best[3]):
         return None
     _, q, factor_q, _ = best
-    return posterior_at(filter, q, factor_q, stamp)
+    return posterior_at(filter, q, factor_q, stamp, begun, active)
 
 
-def posterior_at(filter: Filter, q: np.ndarray, factor_q: np.ndarray, stamp: int) -> Posterior:
-    """A starting posterior: configuration q with factor (nv, nv), at rest with the scene's velocity deviation."""
+def posterior_at(
+    filter: Filter,
+    q: np.ndarray,
+    factor_q: np.ndarray,
+    stamp: int,
+    begun: int | None = None,
+    active: Sequence[bool] | None = None,
+) -> Posterior:
+    """A starting posterior: configuration q with factor (nv, nv), at rest with the scene's velocity deviation.
+
+    Arguments else as of ``start``. What holds its part wherever it is takes hold last.
+    """
+    begun = stamp if begun is None else begun
+    if active is None:
+        active = [effect.active_at((stamp - begun) * 1e-9) for effect in filter.simulator.switches.effects]
+    _enter_start(filter, stamp, begun, active)
     nv, n = filter.simulator.nv, filter.process.n
     state = filter.process.start(q, np.zeros(nv))
     factor = np.zeros((n, n))
@@ -51,7 +77,18 @@ def posterior_at(filter: Filter, q: np.ndarray, factor_q: np.ndarray, stamp: int
     deviations = np.concatenate([filter.scene.noise.velocity, filter.process.start_factor()])
     factor[nv:, nv:] = np.diag(deviations)
     filter.constrain(state, factor)
-    return Posterior(stamp, state, factor, accepted=stamp, used=True, start=True)
+    holds = filter.simulator.switches.holds
+    posterior = Posterior(stamp, state, factor, accepted=stamp, used=True, start=True, begun=begun, holds=holds)
+    for index, on in enumerate(active):
+        posterior = switch(filter, posterior, index, on)
+    return posterior
+
+
+def _enter_start(filter: Filter, stamp: int, begun: int, active: Sequence[bool]) -> None:
+    """Have the simulator hold, at the time of a start, what holds at places that it was told."""
+    simulator = filter.simulator
+    simulator.time = (stamp - begun) * 1e-9
+    simulator.switches.holds = simulator.switches.told(active)
 
 
 def _plausible(filter: Filter, cost: float, freedom: int) -> bool:

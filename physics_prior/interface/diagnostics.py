@@ -19,17 +19,22 @@ def diagnostics(
 ) -> DiagnosticArray:
     """One status; ``estimate`` is None before the first, ``more`` is what its caller alone knows."""
     values: dict[str, object] = {f"measurements {name}": count for name, count in vars(counts).items()}
-    values["active effects"] = ", ".join(effect.label for effect in scene.effects) or "none"
-    values["constraint rows"] = simulator.rows
+    switches = simulator.switches
+    holding = switches.holding if estimate is None else estimate.holding
+    active = [
+        effect.label for effect in scene.effects if effect.label not in switches.labels or effect.label in holding
+    ]
+    values["active effects"] = ", ".join(active) or "none"
     if estimate is not None:
         nis, dimension = estimate.nis
         values |= {
+            "constraint rows": estimate.rows,
             "constraint rank": estimate.rank,
             "constraint error m": f"{estimate.constraint_error:.3g}",
             "nis": f"{nis:.4g}",
             "nis expected": dimension,
         }
-        if estimate.rank < simulator.rows:
+        if estimate.rank < estimate.rows:
             values["forces"] = "the motion is unique, the split of the constraint forces is not"
     status = DiagnosticStatus(
         int(health.level),

@@ -6,6 +6,7 @@ from physics_prior import rotations
 from physics_prior.errors import MeasurementError, PhysicsPriorError
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.estimation.measurement import (
+    ForceMeasurement,
     JointsMeasurement,
     Measurement,
     OrientationMeasurement,
@@ -20,9 +21,18 @@ from physics_prior.recording.messages import (
     PoseArray,
     PoseStamped,
     PoseWithCovarianceStamped,
+    WrenchStamped,
 )
 from physics_prior.recording.wire import Message
-from physics_prior.scene import JointSource, MeasurementSource, OrientationSource, PointsSource, PoseSource, Scene
+from physics_prior.scene import (
+    JointSource,
+    MeasurementSource,
+    OrientationSource,
+    PointsSource,
+    PoseSource,
+    Scene,
+    SwitchSource,
+)
 
 ALL, ROTATION = slice(0, 6), slice(3, 6)  # rows and columns of a 6x6 covariance
 SHOWN_NAMES = 8  # of a message's joints, in a sentence
@@ -81,6 +91,9 @@ def _translate(source: MeasurementSource, message: Message, frame_id: str) -> Me
         names, positions = _known_joints(source, message)
         # a joint's coordinate is the same in every frame
         return JointsMeasurement(_stamp(message.header), topic, names, positions)
+    if isinstance(source, SwitchSource) and isinstance(message, WrenchStamped):
+        # its size is the same in every frame
+        return ForceMeasurement(_stamp(message.header), topic, array_of(message.wrench.force))
     raise MeasurementError(f"a {message.ros_type} came; valid is {' or '.join(source.message_types)}")
 
 

@@ -11,6 +11,7 @@ from physics_prior import __version__, rotations
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.errors import SimulationError
 from physics_prior.estimation.measurement import (
+    ForceMeasurement,
     JointsMeasurement,
     Measurement,
     OrientationMeasurement,
@@ -18,13 +19,21 @@ from physics_prior.estimation.measurement import (
     PoseMeasurement,
 )
 from physics_prior.estimation.process import steps
-from physics_prior.interface.geometry import NANOSECONDS, header_of, point_of, pose_of
+from physics_prior.interface.geometry import NANOSECONDS, header_of, point_of, pose_of, wrench_of
 from physics_prior.recording.definitions import message_class
-from physics_prior.recording.messages import JointState, Pose, PoseArray, PoseStamped
+from physics_prior.recording.messages import JointState, Pose, PoseArray, PoseStamped, WrenchStamped
 from physics_prior.recording.truth import Truth
 from physics_prior.recording.wire import Message
 from physics_prior.recording.writer import BagWriter
-from physics_prior.scene import JointSource, MeasurementSource, OrientationSource, PointsSource, PoseSource, Scene
+from physics_prior.scene import (
+    JointSource,
+    MeasurementSource,
+    OrientationSource,
+    PointsSource,
+    PoseSource,
+    Scene,
+    SwitchSource,
+)
 
 EPOCH = 1_700_000_000 * NANOSECONDS  # stamp of the start, ns: always the same, so that recordings are
 MAXIMUM_MEASUREMENTS = 10_000_000  # times sources: a slip of the finger in the duration fills no disk
@@ -69,7 +78,7 @@ def motion(
         measurements = []
         simulator.move(q, v)
         for source, noise in zip(scene.measurements, noises, strict=True):
-            measurements.append(_measure(source, simulator, q, stamp, noise))
+            measurements.append(_measure(source, simulator, q, v, stamp, noise))
         yield Moment(stamp, q.copy(), v.copy(), measurements)
         following = EPOCH + round((k + 1) * NANOSECONDS / scene.simulation.rate)
         for stretch in simulator.switches.stretches(stamp - EPOCH, following - EPOCH) if k < count else ():
@@ -135,6 +144,8 @@ def message_of(measurement: Measurement, frame_id: str) -> Message:
         return PoseStamped(header, pose_of(np.zeros(3), measurement.orientation))
     if isinstance(measurement, PointsMeasurement):
         return PoseArray(header, [Pose(point_of(point)) for point in measurement.points])
+    if isinstance(measurement, ForceMeasurement):
+        return WrenchStamped(header, wrench_of(measurement.force, np.zeros(3)))
     assert isinstance(measurement, JointsMeasurement)
     return JointState(header, measurement.names, measurement.positions)
 
@@ -153,12 +164,19 @@ def _count(scene: Scene, seed: int, duration: float) -> int:
 
 
 def _measure(
-    source: MeasurementSource, simulator: Simulator, q: np.ndarray, stamp: int, noise: np.random.Generator
+    source: MeasurementSource,
+    simulator: Simulator,
+    q: np.ndarray,
+    v: np.ndarray,
+    stamp: int,
+    noise: np.random.Generator,
 ) -> Measurement:
-    """What a source measures of a configuration; needs ``move``.
+    """What a source measures of a state; needs ``move``.
 
-    Noise is white: of positions in world axes, of rotations as a rotation vector in the measured frame's axes.
+    Noise is white: of positions in world axes, of rotations as a rotation vector in the measured frame's axes. Forces have none.
     """
+    if isinstance(source, SwitchSource):
+        return ForceMeasurement(stamp, source.topic, simulator.wrenches(q, v)[source.effect].force)
     if isinstance(source, PoseSource | OrientationSource):
         position, R = simulator.pose(source.part)
         position = position + R @ np.array(source.frame.position)

@@ -115,4 +115,6 @@ class Truth:
             constraint_error=float(np.max(np.abs(error), initial=0.0)),
             rank=simulator.rank,
             health=Health(Level.OK),
+            rows=simulator.switches.rows,
+            holding=simulator.switches.holding,
         )

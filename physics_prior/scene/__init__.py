@@ -8,6 +8,7 @@ from physics_prior.scene.measurements import (
     OrientationSource,
     PointsSource,
     PoseSource,
+    SwitchSource,
 )
 from physics_prior.scene.readouts import (
     AngleReadout,
@@ -41,5 +42,6 @@ __all__ = [
     "Scene",
     "Simulation",
     "Step",
+    "SwitchSource",
     "load_scene",
 ]

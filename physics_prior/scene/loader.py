@@ -11,13 +11,13 @@ from physics_prior.errors import PhysicsPriorError, SceneError
 from physics_prior.model import Tree
 from physics_prior.resources import scene_path
 from physics_prior.scene.freedoms import read_initial, read_noise
-from physics_prior.scene.measurements import SOURCES, MeasurementSource
+from physics_prior.scene.measurements import SOURCES, MeasurementSource, SwitchSource
 from physics_prior.scene.parts import build_tree
 from physics_prior.scene.quantity import parse_quantity, stated_units
 from physics_prior.scene.readouts import READOUTS, Readout, Subject
 from physics_prior.scene.scene import Scene
 from physics_prior.scene.schema import SceneFile, check_name
-from physics_prior.scene.section import choose, relocate, validate
+from physics_prior.scene.section import choose, relocate, require_known, validate
 from physics_prior.scene.yaml_file import Place, read_yaml
 
 
@@ -32,7 +32,7 @@ def load_scene(name_or_path: str | Path) -> Scene:
     file = validate(SceneFile, top)
     tree = build_tree(top["model"])
     effects = _read_effects(top.get("effects"), tree)
-    measurements = _read_measurements(top.get("measurements"), tree)
+    measurements = _read_measurements(top.get("measurements"), tree, effects)
     if measurements and file.noise is None:
         raise top.error("'noise' is missing: say how far to trust the model, for example 'noise: {force: 1e-3}'")
     return Scene(
@@ -125,12 +125,15 @@ def _check_finite(effect: Effect, tree: Tree) -> bool:
     return len(pairs) > 0
 
 
-def _read_measurements(place: Place, tree: Tree) -> tuple[MeasurementSource, ...]:
+def _read_measurements(place: Place, tree: Tree, effects: tuple[Effect, ...]) -> tuple[MeasurementSource, ...]:
+    held = [effect.label for effect in effects if effect.point_pairs(tree)]
     sources: list[MeasurementSource] = []
     for entry in place.entries():
         _, source_type, inner = choose(entry, SOURCES, "a measurement")
         source = validate(source_type, inner)
         source.check(tree, inner)
+        if isinstance(source, SwitchSource):
+            require_known(inner["effect"], source.effect, held, "effect that holds something")
         if source.topic in [other.topic for other in sources]:
             raise inner["topic"].error(f"'{source.topic}' is read twice: give each measurement its own topic")
         sources.append(source)

@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from typing import Annotated, ClassVar
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from physics_prior.model import JointKind, Tree
 from physics_prior.scene.quantity import quantity
@@ -104,11 +104,36 @@ class JointSource(MeasurementSource):
             require_known(place["joints"][name], joint, known, "revolute or prismatic joint")
 
 
+class SwitchSource(MeasurementSource):
+    """A force by which an effect that holds something is felt: it takes hold above one size of it and lets go below another.
+
+    Attributes:
+        effect: the effect's name.
+        above, below: N.
+    """
+
+    message_types = ("geometry_msgs/msg/WrenchStamped",)
+
+    effect: str
+    above: Annotated[float, quantity("N"), Field(gt=0.0)]
+    below: Annotated[float, quantity("N"), Field(gt=0.0)]
+
+    @model_validator(mode="after")
+    def _check_order(self) -> "SwitchSource":
+        if self.below > self.above:
+            raise ValueError(f"below {self.below:g} N is not valid: give at most above, {self.above:g} N")
+        return self
+
+    def check(self, tree: Tree, place: Place) -> None:
+        """Nothing of the model is named; the loader checks the effect."""
+
+
 SOURCES: dict[str, type[MeasurementSource]] = {
     "pose": PoseSource,
     "orientation": OrientationSource,
     "points": PointsSource,
     "joints": JointSource,
+    "switch": SwitchSource,
 }
 """Every kind of measurement, by its key in the scene file."""
 

@@ -71,6 +71,8 @@ def estimate_of():
             "wrench_deviations": {name: rng.uniform(1, 2, size=6) for name in simulator.wrench_names},
             "constraint_error": 1e-12,
             "rank": simulator.rows,
+            "rows": simulator.switches.rows,
+            "holding": simulator.switches.holding,
             "health": Health(Level.OK),
             "nis": (5.0, 6),
             "counts": Counts(read=10, used=8, gated=1, late=2, rejected=1),

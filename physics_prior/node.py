@@ -5,6 +5,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from physics_prior.errors import PhysicsPriorError
@@ -25,13 +26,13 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from physics_prior.estimation.estimate import Estimate, Health, Level
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.interface import Output, take_in
 from physics_prior.interface.output import Publication
-from physics_prior.interface.topics import MARKERS
+from physics_prior.interface.topics import MARKERS, switch_services
 from physics_prior.interface.warm_up import warm_up
 from physics_prior.recording.cdr import encode
 from physics_prior.ros_inputs import Input, ros_class
@@ -44,7 +45,9 @@ OUTPUT_QUEUE = 100  # states that a slow reader may lag behind
 
 
 class PhysicsPriorNode(LifecycleNode):
-    """Estimates one scene. Parameters: `ros_parameters`; topics: the scene's and `interface.topics`; service ``~/reset``.
+    """Estimates one scene.
+
+    Parameters: `ros_parameters`; topics: the scene's and `interface.topics`; services: ``~/reset``, ``~/effects/NAME``.
 
     Configured it has compiled the scene and announced its topics; active it reads and publishes.
 
@@ -59,7 +62,7 @@ class PhysicsPriorNode(LifecycleNode):
         self._publishers_by_topic: dict[str, Any] = {}
         self._inputs: list[Input] = []
         self._rate_timers: list[Any] = []
-        self._service: Any = None
+        self._services: list[Any] = []
         self._lost_before = 0
         self._forget()
         self.add_on_set_parameters_callback(self._judge_parameters)
@@ -138,7 +141,9 @@ class PhysicsPriorNode(LifecycleNode):
             self._publishers_by_topic[topic] = self.create_lifecycle_publisher(
                 ros_class(message_type.ros_type), topic, QoSProfile(depth=depth, durability=durability)
             )
-        self._service = self.create_service(Trigger, "~/reset", self._reset_asked)
+        self._services = [self.create_service(Trigger, "~/reset", self._reset_asked)]
+        for effect, name in switch_services(scene).items():
+            self._services.append(self.create_service(SetBool, name, partial(self._switch_asked, effect)))
 
     def _stop(self) -> None:
         for each in self._inputs:
@@ -153,9 +158,9 @@ class PhysicsPriorNode(LifecycleNode):
         self._stop()
         for publisher in self._publishers_by_topic.values():
             self.destroy_lifecycle_publisher(publisher)
-        if self._service is not None:
-            self.destroy_service(self._service)
-        self._publishers_by_topic, self._service = {}, None
+        for service in self._services:
+            self.destroy_service(service)
+        self._publishers_by_topic, self._services = {}, []
         self._estimator, self._output = None, None
 
     # Parameters and time --------------------------------------------------------------------------------------------
@@ -210,6 +215,21 @@ class PhysicsPriorNode(LifecycleNode):
     def _reset_asked(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._reset()
         response.success, response.message = True, "the estimate starts anew with the next measurements"
+        return response
+
+    def _switch_asked(self, effect: str, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        """Have an effect take hold or let go now; before the start, at the start."""
+        estimator = self._estimator
+        assert estimator is not None
+        stamp = self._present() if estimator.ready else 0
+        estimator.last_rejection = ""
+        estimator.switch(effect, request.data, stamp)
+        response.message = estimator.last_rejection
+        if not response.message and estimator.ready:
+            estimate = estimator.estimate()
+            if (effect in estimate.holding) != request.data:
+                response.message = estimate.health.cause or f"other commands or forces after {stamp} ns say otherwise"
+        response.success = not response.message
         return response
 
     def _receive(self, source: MeasurementSource, type_name: str, data: bytes) -> None:

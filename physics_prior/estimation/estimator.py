@@ -91,9 +91,12 @@ class Estimator:
         """Have an effect that holds something take hold or let go at a stamp, ns; return whether the newest estimate changed.
 
         A command has its place in the history as a measurement has, before those of its stamp: it may come late. Other
-        commands, the schedule and measured forces after it hold as well: the last word counts.
+        commands, the schedule and measured forces after it hold as well: the last word counts. Before the start, any stamp does.
         """
-        return self.add(SwitchCommand(stamp, command_topic(effect), effect, on))
+        command = SwitchCommand(stamp, command_topic(effect), effect, on)
+        if not self.history and command.topic in self.filter.order:  # of two at one stamp the later word counts
+            self._early = [each for each in self._early if self.filter.key(each) != self.filter.key(command)]
+        return self.add(command)
 
     def estimate(self, stamp: int | None = None) -> Estimate:
         """The newest estimate, or what it predicts for a later stamp, ns.
@@ -195,13 +198,16 @@ class Estimator:
     @property
     def _newest(self) -> int:
         """Stamp of the newest measurement, ns; 0 before the first."""
-        return self.stamp or (self._early[-1].stamp if self._early else 0)
+        waiting = (each.stamp for each in reversed(self._early) if not isinstance(each, SwitchCommand))
+        return self.stamp or next(waiting, 0)
 
     def _misplaced(self, measurement: Measurement) -> str:
         """Why a measurement finds no place; empty if it does."""
         key, history = self.filter.key(measurement), self.history
         if history.holds(measurement) or key in map(self.filter.key, self._early):
             return "was doubled"
+        if isinstance(measurement, SwitchCommand) and not history:
+            return ""
         if (measurement.stamp - self._newest) * 1e-9 > self.scene.health.lost_after and history:
             return "is so far ahead of all others that the estimate would be lost by then"
         oldest = self._newest - START_WINDOW
@@ -258,7 +264,8 @@ class Estimator:
 
     def _set_aside(self, measurement: Measurement, why: str) -> bool:
         """Keep a measurement that finds no place; enough of them in a row mean that the clock has jumped."""
-        if not 0 <= self._newest - measurement.stamp <= START_WINDOW:  # merely late ones tell nothing about the clock
+        late = 0 <= self._newest - measurement.stamp <= START_WINDOW
+        if not late and not isinstance(measurement, SwitchCommand):  # neither tells anything about the clock
             self._stale.append(measurement)
         self._rejected += 1
         self.last_rejection = f"topic '{measurement.topic}': a measurement {why}"

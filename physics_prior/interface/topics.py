@@ -79,6 +79,14 @@ def force_topics(scene: Scene) -> dict[str, str]:
     return topics
 
 
+def switch_services(scene: Scene) -> dict[str, str]:
+    """Return effect that holds something -> name of the node's service that switches it, as in its force's topic."""
+    held = [effect.label for effect in scene.effects if effect.point_pairs(scene.tree)]
+    return {
+        name: f"~/effects/{topic.rsplit('/', 1)[-1]}" for name, topic in force_topics(scene).items() if name in held
+    }
+
+
 def deviation_topic(topic: str) -> str:
     """Return the topic of the standard deviations of a force's topic."""
     return f"{topic}/stddev"

@@ -203,6 +203,7 @@ class _Replay:
     def _emit(self, posterior: Posterior, log_time: int) -> None:
         """Note an estimate, score it and file it."""
         health = self.estimator.health_of(posterior, posterior.stamp)
+        self.estimator.filter.enter(posterior)
         if self.first_stamp is None:
             self.first_stamp = posterior.stamp
         state = posterior.state

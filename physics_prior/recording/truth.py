@@ -19,11 +19,20 @@ from physics_prior.interface.topics import (
     vector_links,
 )
 from physics_prior.model import JointKind
-from physics_prior.recording.messages import JointState, MultiDOFJointState, Odometry, WrenchStamped
+from physics_prior.recording.messages import (
+    DiagnosticArray,
+    DiagnosticStatus,
+    JointState,
+    KeyValue,
+    MultiDOFJointState,
+    Odometry,
+    WrenchStamped,
+)
 from physics_prior.recording.wire import Message
 from physics_prior.scene import Scene
 
 PREFIX = "/truth/"
+EFFECTS = "effects"
 
 
 class Truth:
@@ -46,6 +55,8 @@ class Truth:
         if self._free:
             self.topics[PREFIX + ODOMETRY] = Odometry
         self.topics |= dict.fromkeys(self._forces.values(), WrenchStamped)
+        if simulator.switches.events:
+            self.topics[PREFIX + EFFECTS] = DiagnosticArray
 
     def messages(self, stamp: int, q: np.ndarray, v: np.ndarray) -> Iterator[tuple[str, Message]]:
         """Each topic's message at a state. Forces are the scene's own: the unknown white force has no value to tell."""
@@ -63,6 +74,11 @@ class Truth:
             yield PREFIX + ODOMETRY, odometry(header, self._free[0], state)
         for name, topic in self._forces.items():
             yield topic, WrenchStamped(header, wrench_of(state.wrenches[name].force, state.wrenches[name].moment))
+        if PREFIX + EFFECTS in self.topics:
+            labels = self._simulator.switches.labels
+            values = [KeyValue(label, "on" if label in state.holding else "off") for label in labels]
+            status = DiagnosticStatus(DiagnosticStatus.OK, f"physics_prior: {self._scene.name}", "OK", values=values)
+            yield PREFIX + EFFECTS, DiagnosticArray(header, [status])
 
     def state(self, messages: Mapping[str, Message]) -> tuple[np.ndarray, np.ndarray]:
         """Configuration q (nq,) and velocity v (nv,) from the messages of one stamp by topic: enough for NEES.

@@ -13,7 +13,7 @@ from nav_msgs.msg import Odometry
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import MarkerArray
 
 from physics_prior.dynamics.simulator import Simulator
@@ -264,3 +264,23 @@ def test_reset_starts_the_estimate_anew(graph, measured, send):
     send(node, measured[20:40])
     assert node._estimator.ready
     assert node._estimator.counts.read == 40
+
+
+def test_effects_are_switched_by_a_service(graph):
+    """Before the start and after it; the answer says what is in the way."""
+    scene = load_scene("caught_pendulum")
+    simulator = Simulator(scene.tree, scene.effects, scene.step.integrator)
+    moments = list(islice(motion(scene, simulator), 30))
+    node = graph.node(scene="caught_pendulum")
+    switch = "/physics_prior/effects/hand"
+    assert graph.call(SetBool, switch, SetBool.Request(data=True)).success
+    publisher = graph.publisher(PoseStamped, "/lower/pose")
+    for (measurement,) in (moment.measurements for moment in moments):
+        read = node._estimator.counts.read
+        publisher.publish(encode(message_of(measurement, scene.frame_id)))
+        graph.until(lambda read=read: node._estimator.counts.read > read, "a measurement to be read")
+    assert node._estimator.ready
+    assert graph.call(SetBool, switch, SetBool.Request(data=True)).success
+    assert node._estimator.estimate().holding == ("hand",)
+    assert graph.call(SetBool, switch, SetBool.Request(data=False)).success
+    assert node._estimator.estimate().holding == ()

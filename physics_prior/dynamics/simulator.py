@@ -177,10 +177,15 @@ class Simulator:
         """Have an effect take hold or let go at q and v, which are put in place onto all that holds then; return the impulses.
 
         Raises:
-            ModelError: no effect of that name holds anything; SimulationError: it cannot take hold there.
+            ModelError: no effect of that name holds anything; SimulationError: it cannot take hold there. Then nothing changes.
         """
+        before = self.switches.holds, q.copy(), v.copy()
         self.switches.holds = self.switches.switched(self.switches.index(label), on, q)
-        return self.switches.take_hold(q, v) if on else {}
+        try:
+            return self.switches.take_hold(q, v) if on else {}
+        except SimulationError:
+            self.switches.holds, q[:], v[:] = before
+            raise
 
     def begin(self, q: np.ndarray, v: np.ndarray) -> None:
         """Begin the scene at q and v: time zero, and what holds then takes hold.

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from physics_prior import inertia, rotations
 from physics_prior.dynamics.formulations import generalized
@@ -195,6 +197,8 @@ def test_what_cannot_be_reached_is_refused_with_what_is_left():
     q, v = np.array([1.0]), np.zeros(1)
     with pytest.raises(SimulationError, match="'attachment' cannot take hold: 2 m stay between"):
         simulator.switch("attachment", True, q, v)
+    assert simulator.switches.holding == ()
+    assert (q[0], v[0]) == (1.0, 0.0)
     with pytest.raises(ModelError, match=r"effect 'hand' cannot be switched: .*\['attachment'\]"):
         simulator.switch("hand", True, q, v)
 
@@ -209,6 +213,31 @@ def test_a_weld_never_sticks_at_half_a_turn(axis, angle):
     q[3:] = rotations.exp(np.radians(angle) * axis)
     simulator.switch("weld", True, q, v)
     assert off(np.sign(q[3]) * q, body.neutral()) < 1e-12  # measured 1e-16
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), order=st.lists(st.sampled_from(["hand", "grip", "tether"]), max_size=8))
+def test_any_switching_leaves_numbers_finite_and_adds_no_energy(seed, order, chain, random_state):
+    """A passive scene: each name takes hold where it does not and lets go where it does, 20 ms of motion between."""
+    q, v = random_state(np.random.default_rng(seed), chain)
+    simulator = with_tether(chain, q)
+    for label in order:
+        on = label not in simulator.switches.holding
+        simulator.move(q, v)
+        before = simulator.energy()
+        try:
+            simulator.switch(label, on, q, v)
+        except SimulationError:
+            assert label == "tether"  # the others take hold wherever they are
+            continue
+        simulator.move(q, v)
+        if label != "tether":  # which may have to lift what it pulls
+            assert simulator.energy() <= before + 1e-9
+        assert np.max(np.abs(simulator.constraint_error(q, v))) <= 1e-10
+        simulator.advance(q, v, 1e-3, 20)
+        assert np.all(np.isfinite(q))
+        assert np.all(np.isfinite(v))
+        assert np.max(np.abs(simulator.constraint_error(q, v)), initial=0.0) <= 1e-10
 
 
 def test_what_others_hold_half_a_turn_away_is_refused():

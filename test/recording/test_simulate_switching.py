@@ -7,7 +7,8 @@ import pytest
 
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.errors import SceneError
-from physics_prior.recording.simulate import motion
+from physics_prior.recording import decode, open_bag
+from physics_prior.recording.simulate import EPOCH, motion, simulate
 from physics_prior.scene import load_scene
 
 SCENE = """
@@ -90,3 +91,21 @@ def test_motions_are_read_with_units(scene_of):
         )
     with pytest.raises(SceneError, match=r"attachment\.at: 'there' is not"):
         scene_of("{from: 0.5}", **{"at: here": "at: there"})
+
+
+def test_the_truth_tells_what_holds(scene_of, tmp_path):
+    """On a topic of its own, where something is scheduled; its force is zero where it does not hold."""
+    simulate(scene_of("{from: 0.5 s, until: 0.8 s}"), tmp_path / "bag", duration=1.0)
+    told, forces = {}, {}
+    for record in open_bag(tmp_path / "bag").read(["/truth/effects", "/truth/constraint_forces/hand"]):
+        message = decode(record.message_type, record.data)
+        time = round((record.log_time_ns - EPOCH) * 1e-9, 3)
+        if record.topic == "/truth/effects":
+            (value,) = message.status[0].values
+            told[time] = (value.key, value.value)
+        else:
+            forces[time] = message.wrench.force
+    assert len(told) == 101
+    for time, (name, state) in told.items():
+        assert (name, state) == ("hand", "on" if 0.5 <= time < 0.8 else "off")
+        assert (forces[time].z != 0.0) == (state == "on")

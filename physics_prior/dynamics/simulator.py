@@ -174,29 +174,13 @@ class Simulator:
             projection.project_velocity(own.links, own.work, own.pairs, own.rows, v, own.spare)
 
     def switch(self, label: str, on: bool, q: np.ndarray, v: np.ndarray) -> dict[str, Wrench]:
-        """Have an effect take hold or let go at q and v, which are put in place onto all that holds then; return the impulses.
-
-        Raises:
-            ModelError: no effect of that name holds anything; SimulationError: it cannot take hold there. Then nothing changes.
-        """
-        before = self.switches.holds, q.copy(), v.copy()
-        self.switches.holds = self.switches.switched(self.switches.index(label), on, q)
-        try:
-            return self.switches.take_hold(q, v) if on else {}
-        except SimulationError:
-            self.switches.holds, q[:], v[:] = before
-            raise
+        """Have an effect take hold or let go at q and v: ``Switches.switch``."""
+        return self.switches.switch(label, on, q, v)
 
     def begin(self, q: np.ndarray, v: np.ndarray) -> None:
-        """Begin the scene at q and v: time zero, and what holds then takes hold.
-
-        Raises:
-            SimulationError: it cannot.
-        """
+        """Begin the scene at q and v: time zero, and what holds then takes hold; SimulationError if it cannot."""
         self.time = 0.0
-        for index, effect in enumerate(self.switches.effects):
-            self.switches.holds = self.switches.switched(index, effect.active_at(0.0), q)
-        self.switches.take_hold(q, v)
+        self.switches.begin(q, v)
 
     def displaced(self, q: np.ndarray, delta: np.ndarray) -> np.ndarray:
         """(nq,) q moved by a tangent vector (nv,), as Tree.integrate does, compiled."""

@@ -98,6 +98,26 @@ class Switches:
         pairs = self._simulator.memory.pairs
         return int(pairs["rows"] @ pairs["active"]) if len(pairs) else 0
 
+    def switch(self, label: str, on: bool, q: np.ndarray, v: np.ndarray) -> dict[str, Wrench]:
+        """Have an effect take hold or let go at q and v, which are put in place onto all that holds then; return the impulses.
+
+        Raises:
+            ModelError: no effect of that name holds anything; SimulationError: it cannot take hold there. Then nothing changes.
+        """
+        before = self._holds, q.copy(), v.copy()
+        self.holds = self.switched(self.index(label), on, q)
+        try:
+            return self.take_hold(q, v) if on else {}
+        except SimulationError:
+            self.holds, q[:], v[:] = before
+            raise
+
+    def begin(self, q: np.ndarray, v: np.ndarray) -> None:
+        """Have what holds at time zero take hold at q and v, which are put in place onto all of it."""
+        for index, effect in enumerate(self.effects):
+            self.holds = self.switched(index, effect.active_at(0.0), q)
+        self.take_hold(q, v)
+
     def row_span(self, index: int) -> slice:
         """The rows of an effect among those of the constraints."""
         first, last = self.spans[index]

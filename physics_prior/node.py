@@ -223,7 +223,8 @@ class PhysicsPriorNode(LifecycleNode):
         assert estimator is not None
         stamp = self._present() if estimator.ready else 0
         estimator.last_rejection = ""
-        estimator.switch(effect, request.data, stamp)
+        if estimator.switch(effect, request.data, stamp):
+            self._arrived = self._now()
         response.message = estimator.last_rejection
         if not response.message and estimator.ready:
             estimate = estimator.estimate()

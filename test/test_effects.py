@@ -101,6 +101,13 @@ def test_effects_that_do_not_fit_are_refused(tree, effect, message):
     "make",
     [
         lambda: Rod(part="tip", length=0.0),
+        lambda: Rod(part="tip", length=1.0, at="here"),
+        lambda: Attachment(part="tip", at="there"),
+        lambda: Weld(part="tip", at=None),
+        lambda: Attachment(part="tip", when={"from": 1.0}, initially="on"),
+        lambda: Attachment(part="tip", when=[{"from": -1.0}]),
+        lambda: Attachment(part="tip", when=[{"until": 1.0}, {"from": 2.0, "until": 2.0}]),
+        lambda: Attachment(part="tip", initially="later"),
         lambda: Rod(part="tip", length=1.0, lenght=2.0),
         lambda: JointDamping(coefficients={"elbow": -1.0}),
         lambda: JointDamping(coefficients={}),
@@ -178,3 +185,27 @@ def test_hinge_and_weld_leave_what_they_should(tree, effect):
         assert np.allclose(position + R @ effect.point, effect.at, atol=1e-11)
         assert np.allclose(R @ axis, axis, atol=1e-10)
         assert rotations.log(rotations.quaternion_from_matrix(R)) @ axis != pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("when", "on", "switches"),
+    [
+        ((), (0.0, 1.0, 5.0), ()),
+        ({"from": 1.0, "until": 2.0}, (1.0, 1.999999999), (1.0, 2.0)),
+        ({"until": 2.0}, (0.0, 1.5), (2.0,)),
+        (
+            [{"from": 0.1, "until": 0.3}, {"from": 0.3, "until": 0.7}, {"from": 3.0}],
+            (0.1, 0.3, 0.6, 4.0),
+            (0.1, 0.7, 3.0),
+        ),
+    ],
+)
+def test_windows_of_time_begin_at_once_and_end_before_their_end(when, on, switches):
+    """To the nanosecond; windows that touch are one."""
+    effect = Attachment(part="tip", when=when)
+    assert effect.switch_times() == switches
+    for time in (0.0, 0.1, 0.3, 0.6, 0.7, 1.0, 1.5, 1.999999999, 2.0, 4.0, 5.0):
+        windows = [when] if isinstance(when, dict) else when
+        inside = any(window.get("from", 0.0) <= time < window.get("until", np.inf) for window in windows)
+        assert effect.active_at(time) == (inside or not when)
+    assert all(effect.active_at(time) for time in on)

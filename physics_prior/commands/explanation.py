@@ -141,7 +141,10 @@ def _state(scene: Scene, simulator: Simulator) -> Table:
 def _constraints(simulator: Simulator) -> str:
     if simulator.rows == 0:
         return "none beside the joints"
-    rows = f"{simulator.switches.rows} rows of rank {simulator.rank}"
+    acting = simulator.switches.rows
+    rows = f"{acting} rows of rank {simulator.rank}"
+    if acting < simulator.rows:
+        rows += f" at the start, {simulator.rows} where all holds"
     if simulator.rank < simulator.switches.rows:
         return f"{rows}: the motion is unique, the split of forces is not (the smallest is given)"
     return rows

@@ -266,21 +266,21 @@ def test_reset_starts_the_estimate_anew(graph, measured, send):
     assert node._estimator.counts.read == 40
 
 
-def test_effects_are_switched_by_a_service(graph):
-    """Before the start and after it; the answer says what is in the way."""
+def test_effects_are_switched_by_a_service(graph, clock):
+    """Before the start and after it, at the node's time, which goes on from there."""
     scene = load_scene("caught_pendulum")
     simulator = Simulator(scene.tree, scene.effects, scene.step.integrator)
-    moments = list(islice(motion(scene, simulator), 30))
-    node = graph.node(scene="caught_pendulum")
+    node = graph.node(scene="caught_pendulum", use_sim_time=True)
+    clock(node, 1000.0)
     switch = "/physics_prior/effects/hand"
     assert graph.call(SetBool, switch, SetBool.Request(data=True)).success
     publisher = graph.publisher(PoseStamped, "/lower/pose")
-    for (measurement,) in (moment.measurements for moment in moments):
-        read = node._estimator.counts.read
+    for moment in islice(motion(scene, simulator), 30):
+        (measurement,), read = moment.measurements, node._estimator.counts.read
         publisher.publish(encode(message_of(measurement, scene.frame_id)))
         graph.until(lambda read=read: node._estimator.counts.read > read, "a measurement to be read")
-    assert node._estimator.ready
-    assert graph.call(SetBool, switch, SetBool.Request(data=True)).success
     assert node._estimator.estimate().holding == ("hand",)
+    clock(node, 1000.1)
     assert graph.call(SetBool, switch, SetBool.Request(data=False)).success
     assert node._estimator.estimate().holding == ()
+    assert node._estimator.stamp == node._present() == moment.stamp + 100_000_000

@@ -49,6 +49,7 @@ setup(
         "ros": ["ros-jazzy-rclpy", "ros-jazzy-common-interfaces", "ros-jazzy-rmw-fastrtps-cpp"],
         "test": [
             "pytest",
+            "pytest-xdist",  # both cores: compiling kernels is most of the tests' time
             "hypothesis",  # property tests
             "rosbags",  # an independent reader of the recordings
             "setuptools",  # the packaging tests read this file

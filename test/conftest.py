@@ -11,13 +11,21 @@ from hypothesis import settings
 # Without the check a field of the wrong type goes out as junk.
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-os.environ["ROS_DOMAIN_ID"] = str(1 + secrets.randbelow(101))
+# Workers of pytest-xdist differ in parity, so that two of them never hear each other.
+WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+os.environ["ROS_DOMAIN_ID"] = str(2 * secrets.randbelow(25) + 1 + WORKER % 2)
 
 # No deadline: the first example of a test may compile kernels.
 settings.register_profile("physics_prior", deadline=None, derandomize="CI" in os.environ)
 settings.load_profile("physics_prior")
 
 ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture
+def other_domain() -> str:
+    """A ROS domain for processes of a test's own, which this process is not in."""
+    return str(51 + 2 * secrets.randbelow(25) + WORKER % 2)
 
 
 @pytest.fixture(scope="session")

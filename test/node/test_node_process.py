@@ -1,7 +1,6 @@
 """The node as a process: exit codes, signals, and the same numbers as a replay, bit for bit."""
 
 import os
-import random
 import re
 import signal
 import subprocess
@@ -37,9 +36,9 @@ NODE = [sys.executable, "-m", "physics_prior.node", "--ros-args"]
 
 
 @pytest.fixture
-def environment(tmp_path, monkeypatch):
+def environment(tmp_path, monkeypatch, other_domain):
     """A ROS domain of the test's own for this process and its children."""
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(random.randint(1, 101)))
+    monkeypatch.setenv("ROS_DOMAIN_ID", other_domain)
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")])))

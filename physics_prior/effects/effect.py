@@ -73,8 +73,8 @@ class Effect(BaseModel):
     """Base of all effects. One effect is one file: parameters with units and bounds, what it adds, why it is there.
 
     An effect overrides what it contributes: ``field`` (an acceleration all mass feels), ``compiled`` + ``parameters`` (a
-    force), ``point_pairs`` (equality rows). One with equality rows may come and go: ``active_at``, ``switch_times``.
-    force), ``point_pairs`` (equality rows), ``joint_ranges`` and ``touching_pairs`` (inequality rows).
+    force), ``point_pairs`` (equality rows), ``joint_ranges`` and ``touching_pairs`` (inequality rows). One with equality rows may
+    come and go: ``active_at``, ``switch_times``.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, allow_inf_nan=False)

@@ -12,6 +12,7 @@ from physics_prior.effects.drag import Drag
 from physics_prior.effects.gravity import Gravity
 from physics_prior.effects.joint_damping import JointDamping
 from physics_prior.effects.joint_spring import JointSpring
+from physics_prior.effects.soft_limit import SoftLimit
 from physics_prior.effects.spring import Spring
 from physics_prior.errors import ModelError
 from physics_prior.inertia import box
@@ -49,6 +50,7 @@ def test_registry_names_every_effect_by_its_kind():
         (JointSpring(stiffness={"elbow": 1.0, "wrist": 2.0}, rest={"elbow": 0.3}), 0),
         (Spring(part="tip", stiffness=10.0, damping=1.0), 0),
         (Drag(part="tip", quadratic=0.1, wind=(1, 0, 0)), 0),
+        (SoftLimit(upper={"elbow": 1.0}, range={"elbow": 0.2}, stiffness={"elbow": 3.0}), 0),
         (Attachment(part="tip"), 3),
         (Rod(part="tip", length=0.5), 1),
         (Hinge(part="tip", axis=(0, 0, 2), to_axis=(0, 0, 1)), 5),

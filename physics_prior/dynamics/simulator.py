@@ -34,6 +34,7 @@ class Simulator:
         tree, effects, integrator: what it was built from.
         nq, nv, rows: sizes of configuration, velocity and constraint rows.
         wrench_names: whose wrenches there are: moving joints, then effects that hold something, then what touches.
+        touching: the last of these, contacts and limits, each with the indices of its records in ``candidates``.
         switches: which of these hold now, and what happens when they take hold (switches.py).
         interval: s, over which impulses of contact are told as forces: the step size.
         step, memory: the compiled step (compose.py) and the array it works in (memory.py).
@@ -69,16 +70,15 @@ class Simulator:
         touching = [pair for effect in effects for pair in effect.touching_pairs(tree)]
         ranges = [each for effect in effects for each in effect.joint_ranges(tree)]
         candidates = candidate_records(tree, ranges, touching)
-        self._touching = candidates_by_name(tree, effects)
+        self.touching = candidates_by_name(tree, effects)
         self.wrench_names = [
             *(link.joint.name for link in tree.links),
             *(label for label, _, _ in self._labels),
-            *self._touching,
+            *self.touching,
         ]
-        self.interval = interval
+        self.interval, self.rank = interval, 0
         self.nq, self.nv = tree.nq, tree.nv
         self.rows = sum(1 if pair.length is not None else len(pair.directions) for pair in pairs)
-        self.rank = 0
         records, parameters = pair_records(tree, pairs), pack_parameters(tree, effects)
         tables = motion_tables(tree, pairs, records, len(parameters))
         needs = INTEGRATORS[integrator]
@@ -98,7 +98,7 @@ class Simulator:
         memory.array[TOLERANCE] = tolerance
         self.memory = memory
         self._links, self._work, self._pairs = memory.links, memory.work, memory.pairs
-        self._candidates = candidates_in(memory.contact_part)
+        self.candidates = candidates_in(memory.contact_part)
         self._gravity = memory.parameters[:GRAVITY]
         self.step = step_module(effects, bool(pairs), integrator, len(candidates) > 0)
         self._rotations, self._origins = self._work["rotation"].reshape(-1, 3, 3), self._work["origin"]
@@ -290,9 +290,11 @@ class Simulator:
                 out[row, :3] = own["force"].sum(axis=0)
                 if last - first > 1:
                     out[row, 3:] = np.cross(own["b"] - own["b"][0], own["force"]).sum(axis=0)
-            for row, indices in enumerate(self._touching.values(), start=count + len(self._labels)):
-                out[row, :3], out[row, 3:] = reaction(self.tree, self._work, self._candidates[indices])
+            for row, indices in enumerate(self.touching.values(), start=count + len(self._labels)):
+                push = reaction(self.tree, self._work, self.candidates[indices])
+                out[row, :3], out[row, 3:] = push.force, push.moment
         else:
+            self.candidates[["force", "moment", "point"]] = 0.0
             kinematics.move(self._links, self._work, q, v)
             newton_euler.spread(self._links, self._work, vdot, self._gravity)
         newton_euler.transmit(self._links, self._work)
@@ -307,7 +309,7 @@ class Simulator:
         points = [
             *self._work["origin"],
             *(self._pairs["b"][first] for _, first, _ in self._labels),
-            *(self._candidates[indices[0]]["point"] for indices in self._touching.values()),
+            *(reaction(self.tree, self._work, self.candidates[each]).point for each in self.touching.values()),
         ]
         return {
             name: Wrench(row[:3], row[3:], np.array(point))
@@ -353,7 +355,7 @@ class Simulator:
     def _evaluate(self, q: np.ndarray, v: np.ndarray, extra: np.ndarray, vdot: np.ndarray) -> None:
         array, h = self.memory.array, self.interval
         self.rank = self.step.evaluate(array, q, v, extra, 0.0, vdot)
-        if self._touching:
+        if self.touching:
             # contact forces are the impulses of a step to come, over its time
             impulse.resolve(array, q, v + h * vdot, h, False)
             self.step.evaluate(array, q, v, extra, 0.0, vdot)

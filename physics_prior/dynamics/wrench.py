@@ -12,3 +12,8 @@ class Wrench:
     force: np.ndarray
     moment: np.ndarray
     point: np.ndarray
+
+    @property
+    def acts(self) -> bool:
+        """Whether it is not nothing: what touches pushes, what does not gives exact zeros."""
+        return bool(self.force.any() or self.moment.any())

@@ -11,7 +11,20 @@ from physics_prior.effects.joint_spring import JointSpring
 from physics_prior.effects.soft_limit import SoftLimit
 from physics_prior.effects.spring import Spring
 
-_EFFECTS = (Gravity, JointDamping, JointSpring, Spring, Drag, SoftLimit, JointLimit, Contact, Attachment, Rod, Hinge, Weld)
+_EFFECTS = (
+    Gravity,
+    JointDamping,
+    JointSpring,
+    Spring,
+    Drag,
+    SoftLimit,
+    JointLimit,
+    Contact,
+    Attachment,
+    Rod,
+    Hinge,
+    Weld,
+)
 REGISTRY: dict[str, type[Effect]] = {effect.kind: effect for effect in _EFFECTS}
 """Every effect a scene may name, by its key in the scene file."""
 

@@ -24,7 +24,7 @@ def depth(link: Record, end: Array, q: Array) -> float:
 def push_back(end: Array, d: float, rate: float) -> tuple[float, float, float]:
     """Force away from an end at depth d >= 0 that grows at a rate, and its derivatives by depth and rate.
 
-    The spring has the stiffness k d / range up to the end and k beyond, so k d^2 / (2 range) and then k (d - range / 2). The damper
+    The spring has the stiffness k d / range up to the end and k beyond: k d^2 / (2 range), then k (d - range / 2). The damper
     comes in with the smooth share x^2 (3 - 2 x) of x = d / range, and holds nothing back: force is never negative.
     """
     reach, k = end[3], end[4]

@@ -12,6 +12,7 @@ from physics_prior.estimation.filter import Filter, Posterior
 from physics_prior.estimation.history import START_WINDOW, History, Node
 from physics_prior.estimation.measurement import Measurement, SwitchCommand, command_topic
 from physics_prior.estimation.process import PROCESSES
+from physics_prior.estimation.readout import force_errors
 from physics_prior.estimation.start import start
 from physics_prior.estimation.switching import active_at_start
 from physics_prior.scene import Scene
@@ -148,16 +149,17 @@ class Estimator:
     def _wrench_deviations(self, posterior: Posterior) -> np.ndarray:
         """(wrenches, 6) standard deviations: P_w = (dw/dx) P (dw/dx)^T, by differences along the columns of P's factor.
 
-        Of the forces that go with the state; the white force noise itself has none that a moment's value could have.
+        Of the forces that go with the state; the white force noise itself has none that a moment's value could have. Those of
+        contact are given that what touches goes on touching.
         """
-        process, simulator = self.filter.process, self.simulator
+        process, simulator, here = self.filter.process, self.simulator, posterior.state
         total = np.zeros((len(simulator.wrench_names), 6))
-        for column in posterior.factor.T:
+        for column in force_errors(simulator, posterior).T:
             if not column.any():
                 continue
             pair = []
             for sign in (DIFFERENCE, -DIFFERENCE):
-                state = process.displace(posterior.state, sign * column)
+                state = process.displace(here, sign * column)
                 vdot = state.acceleration if len(state.acceleration) else None
                 pair.append(simulator.wrench_array(state.q, state.v, vdot))
             total += ((pair[0] - pair[1]) / (2.0 * DIFFERENCE)) ** 2

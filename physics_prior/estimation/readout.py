@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 
+from physics_prior.dynamics.contact.admissible import admissible_errors
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.estimation.filter import Posterior
 from physics_prior.estimation.process import Process
@@ -80,18 +81,45 @@ def jacobian(readouts: Sequence[Readout], simulator: Simulator, q: np.ndarray, v
 
 
 def deviations(readouts: Sequence[Readout], simulator: Simulator, process: Process, posterior: Posterior) -> Values:
-    """Standard deviations of the readouts: by differences along the columns of the covariance's factor."""
-    total: Values = {}
-    for column in posterior.factor.T:
+    """Standard deviations of the readouts: by differences along the columns of the covariance's factor.
+
+    Those of forces are given that what touches goes on touching.
+    """
+    forces = [readout for readout in readouts if isinstance(readout, ForceReadout)]
+    errors = force_errors(simulator, posterior) if forces else posterior.factor
+    if errors is posterior.factor:
+        return _deviations(readouts, simulator, process, posterior, errors)
+    others = [readout for readout in readouts if readout not in forces]
+    return {
+        **_deviations(others, simulator, process, posterior, posterior.factor),
+        **_deviations(forces, simulator, process, posterior, errors),
+    }
+
+
+def force_errors(simulator: Simulator, posterior: Posterior) -> np.ndarray:
+    """(n, k) the columns of a posterior's factor as far as they leave be what touches (dynamics/contact/admissible.py)."""
+    state = posterior.state
+    if len(state.acceleration):
+        return posterior.factor
+    return admissible_errors(simulator, state.q, state.v, posterior.factor)
+
+
+def _deviations(
+    readouts: Sequence[Readout], simulator: Simulator, process: Process, posterior: Posterior, errors: np.ndarray
+) -> Values:
+    here = posterior.state
+    values = evaluate(readouts, simulator, here.q, here.v, measured_acceleration(here.acceleration))
+    total = {name: np.zeros_like(value) for name, value in values.items()}
+    for column in errors.T:
         if not column.any():
             continue
         pair = []
         for sign in (DIFFERENCE, -DIFFERENCE):
-            state = process.displace(posterior.state, sign * column)
+            state = process.displace(here, sign * column)
             pair.append(evaluate(readouts, simulator, state.q, state.v, measured_acceleration(state.acceleration)))
         for name in pair[0]:
             slope = difference(pair[0][name], pair[1][name], _is_angle(readouts, name)) / (2.0 * DIFFERENCE)
-            total[name] = total.get(name, 0.0) + slope**2
+            total[name] = total[name] + slope**2
     return {name: np.sqrt(square) for name, square in total.items()}
 
 

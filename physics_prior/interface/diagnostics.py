@@ -21,10 +21,13 @@ def diagnostics(
     values: dict[str, object] = {f"measurements {name}": count for name, count in vars(counts).items()}
     switches = simulator.switches
     holding = switches.holding if estimate is None else estimate.holding
-    active = [
-        effect.label for effect in scene.effects if effect.label not in switches.labels or effect.label in holding
-    ]
+    touching = [name for name in simulator.touching if estimate is not None and estimate.wrenches[name].acts]
+    acting = {*holding, *touching}
+    reactions = {effect.label: effect.reactions(scene.tree) for effect in scene.effects}
+    active = [label for label, names in reactions.items() if not names or acting.intersection(names)]
     values["active effects"] = ", ".join(active) or "none"
+    if simulator.touching:
+        values["touching"] = ", ".join(touching) or "nothing"
     if estimate is not None:
         nis, dimension = estimate.nis
         values |= {

@@ -1,4 +1,4 @@
-"""Markers out: what RViz and Foxglove draw. Parts as shapes, constraint forces as arrows, uncertainty as ellipsoids."""
+"""Markers out: what RViz and Foxglove draw. Parts as shapes, forces as arrows, contacts as dots, uncertainty as ellipsoids."""
 
 from collections.abc import Iterator
 
@@ -13,13 +13,14 @@ from physics_prior.model import Part, Tree
 from physics_prior.recording.messages import ColorRGBA, Header, Marker, MarkerArray, Pose, Vector3
 
 STANDARD_GRAVITY = 9.80665  # m/s^2: a force of all parts' weight is drawn as long as the largest part
-SHAFT, HEAD = 0.04, 0.1  # diameters of an arrow, of the size of the model
+SHAFT, HEAD, DOT = 0.04, 0.1, 0.08  # diameters of an arrow and of a point of contact, of the size of the model
 LEAST_ARROW, LEAST_AXIS = 1e-3, 1e-3  # drawn: of the size of the model
 PROBABILITY = 0.95  # that the true point is inside its ellipsoid
 RADIUS = float(np.sqrt(chi2.ppf(PROBABILITY, 3)))  # in standard deviations
 
 PART_COLOR = ColorRGBA(0.55, 0.65, 0.8, 1.0)
 FORCE_COLOR = ColorRGBA(0.85, 0.2, 0.15, 1.0)
+CONTACT_COLOR = ColorRGBA(0.1, 0.75, 0.3, 1.0)
 UNCERTAINTY_COLOR = ColorRGBA(0.95, 0.75, 0.1, 0.4)
 
 
@@ -27,13 +28,15 @@ def markers(header: Header, forces: list[str], estimate: Estimate, simulator: Si
     """Draw an estimate. A marker keeps namespace and id: parts and links by their order in the tree, forces by theirs.
 
     An ellipsoid holds the link's centre of mass with 95 % probability; an arrow begins where its force acts. Both are
-    drawn from one thousandth of the model's size on. Calls ``simulator.move``.
+    drawn from one thousandth of the model's size on. A dot stands, while something touches, where its force acts.
+    Calls ``simulator.move``.
     """
     simulator.move(estimate.q, estimate.v)
     size = _size(simulator.tree)
     drawn = [
         *_parts(header, simulator),
         *_forces(header, forces, estimate, size, simulator.tree.mass),
+        *_contacts(header, simulator, estimate, size),
         *_uncertainty(header, estimate, simulator, size),
     ]
     return MarkerArray(drawn)
@@ -101,6 +104,21 @@ def _forces(header: Header, forces: list[str], estimate: Estimate, size: float, 
             thickness,
             FORCE_COLOR,
             points=(point_of(wrench.point), point_of(wrench.point + arrow)),
+        )
+
+
+def _contacts(header: Header, simulator: Simulator, estimate: Estimate, size: float) -> Iterator[Marker]:
+    for index, name in enumerate(simulator.touching):
+        wrench = estimate.wrenches[name]
+        yield Marker(
+            header,
+            "contacts",
+            index,
+            Marker.SPHERE,
+            Marker.ADD if wrench.acts else Marker.DELETE,
+            pose_of(wrench.point, np.array([1.0, 0.0, 0.0, 0.0])),
+            Vector3(DOT * size, DOT * size, DOT * size),
+            CONTACT_COLOR,
         )
 
 

@@ -51,27 +51,43 @@ def candidates_in(contact_part: np.ndarray) -> np.ndarray:
 
 
 @inline_kernel
+def _starts(n: int, c: int, m: int, w: int) -> tuple[int, int, int, int, int, int, int]:
+    """Where the part's sections begin in it, for n candidates, c contacts, and m rows over w degrees of freedom."""
+    contacts = HEAD + n * CANDIDATE_SIZE
+    points = contacts + c * CONTACT_SIZE
+    factors = points + (SLOTS + ASKED) * POINT_SIZE
+    matrices = factors + 2 * m * w
+    vectors = matrices + 2 * m * m
+    return HEAD, contacts, points, factors, matrices, vectors, vectors + VECTORS * m
+
+
+@inline_kernel
 def contact_sections(memory: Array) -> Any:
     """The part's sections: candidates, contacts, points, Y and Z (2, m, w), S and scratch (2, m, m), vectors, states."""
     base = int(memory[CONTACT_PART])
     n, c, m = int(memory[base]), int(memory[base + 1]), int(memory[base + 2])
     w, nq = int(memory[base + 3]), int(memory[base + 4])
-    a = base + HEAD
-    b = a + n * CANDIDATE_SIZE
-    d = b + c * CONTACT_SIZE
-    e = d + (SLOTS + ASKED) * POINT_SIZE
-    f = e + 2 * m * w
-    g = f + 2 * m * m
-    h = g + VECTORS * m
+    a, b, d, e, f, g, h = _starts(n, c, m, w)
     return (
-        carray(address(memory, a), n, CANDIDATE),
-        carray(address(memory, b), c, CONTACT),
-        carray(address(memory, d), (SLOTS + ASKED, POINT_SIZE), FLOAT),
-        carray(address(memory, e), (2, m, w), FLOAT),
-        carray(address(memory, f), (2, m, m), FLOAT),
-        carray(address(memory, g), (VECTORS, m), FLOAT),
-        carray(address(memory, h), (STATES, nq), FLOAT),
+        carray(address(memory, base + a), n, CANDIDATE),
+        carray(address(memory, base + b), c, CONTACT),
+        carray(address(memory, base + d), (SLOTS + ASKED, POINT_SIZE), FLOAT),
+        carray(address(memory, base + e), (2, m, w), FLOAT),
+        carray(address(memory, base + f), (2, m, m), FLOAT),
+        carray(address(memory, base + g), (VECTORS, m), FLOAT),
+        carray(address(memory, base + h), (STATES, nq), FLOAT),
     )
+
+
+def solved_system(contact_part: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The contacts that were last solved for (CONTACT records), and of all rows impulses and velocities after them."""
+    n, c, m, w = (int(number) for number in contact_part[:4])
+    count, rows = int(contact_part[5]), int(contact_part[6])
+    _, contacts, _, _, matrices, vectors, _ = _starts(n, c, m, w)
+    S = contact_part[matrices : matrices + m * m].reshape(m, m)[:rows, :rows]
+    bias = contact_part[vectors : vectors + rows]
+    impulses = contact_part[vectors + 4 * m : vectors + 4 * m + rows]
+    return contact_part[contacts : contacts + count * CONTACT_SIZE].view(CONTACT), impulses, bias + S @ impulses
 
 
 @inline_kernel

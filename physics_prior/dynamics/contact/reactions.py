@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from physics_prior.dynamics.wrench import Wrench
 from physics_prior.effects.effect import Effect
 from physics_prior.model import JointKind, Tree
 
@@ -24,14 +25,16 @@ def candidates_by_name(tree: Tree, effects: Sequence[Effect]) -> dict[str, list[
     return out
 
 
-def reaction(tree: Tree, work: np.ndarray, own: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Force (3,) N and moment (3,) N m ON the part, world axes, of the CANDIDATE records of one name.
+def reaction(tree: Tree, work: np.ndarray, own: np.ndarray) -> Wrench:
+    """What the CANDIDATE records of one name do to the part, world axes, when last asked for.
 
-    Of a pair of surfaces about the middle of its normal force; of a joint's two ends along or about the axis.
+    Of a pair of surfaces at the middle of its normal force, the world's origin while nothing touches; of a joint's two ends along
+    or about the axis, at the joint.
     """
     if not own[0]["is_limit"]:
-        return own[0]["force"], own[0]["moment"]
+        return Wrench(own[0]["force"], own[0]["moment"], own[0]["point"])
     link = own[0]["link_b"]
     push = own["force"][:, 0].sum() * work[link]["axis"]
     turns = tree.links[link].joint.kind is JointKind.REVOLUTE
-    return (np.zeros(3), push) if turns else (push, np.zeros(3))
+    force, moment = (np.zeros(3), push) if turns else (push, np.zeros(3))
+    return Wrench(force, moment, work[link]["origin"])

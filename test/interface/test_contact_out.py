@@ -44,7 +44,10 @@ description: a rod on a hinge that lies against its stop
 model:
   parts:
     rod:
-      {mass: 3, center_of_mass: [0, 0, -0.5], inertia: {rod: 1 m}, joint: {kind: revolute, axis: y, name: pin, position: [0, 0, 2]}}
+      mass: 3
+      center_of_mass: [0, 0, -0.5]
+      inertia: {rod: 1 m}
+      joint: {kind: revolute, axis: y, name: pin, position: [0, 0, 2]}
 effects: [gravity, {joint_limit: {name: stop, lower: {pin: -1}, upper: {pin: -0.4}}}]
 measurements: []
 """
@@ -55,7 +58,10 @@ model:
   parts:
     foot: {mass: 1, inertia: 0.01, joint: free}
     leg:
-      {mass: 4, center_of_mass: [0, 0, -0.3], inertia: {box: [0.1, 0.1, 0.6]}, joint: {kind: spherical, name: ankle, parent: foot}}
+      mass: 4
+      center_of_mass: [0, 0, -0.3]
+      inertia: {box: [0.1, 0.1, 0.6]}
+      joint: {kind: spherical, name: ankle, parent: foot}
 effects: [gravity, {weld: {name: grip, part: foot, at: [0, 0, 1]}}]
 measurements: []
 initial: {positions: {foot: {position: [0, 0, 1]}}}

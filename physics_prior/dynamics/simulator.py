@@ -21,6 +21,7 @@ from physics_prior.errors import ModelError, SimulationError
 from physics_prior.model import Tree
 
 SINGULAR = 1e-13  # least eigenvalue of the scaled mass matrix: below, a joint moves nothing
+ROUNDING = 1e-15  # of the largest moment about a joint: below, a moment is zero
 
 
 class Simulator:
@@ -375,10 +376,12 @@ class Simulator:
         for _ in range(3):
             q = self.tree.integrate(self.tree.neutral(), rng.normal(size=self.nv))
             M = self.mass_matrix(q)
-            scale = np.sqrt(np.diag(M))
-            if np.any(scale == 0.0):
-                worst = int(np.argmin(scale))
+            inertia = np.diag(M)
+            lacking = [k for link in self.tree.links for k in _idle(inertia, link.v)]
+            if lacking:
+                worst = lacking[0]
             else:
+                scale = np.sqrt(inertia)
                 values, vectors = np.linalg.eigh(M / np.outer(scale, scale))
                 if values[0] > SINGULAR:
                     return
@@ -387,3 +390,10 @@ class Simulator:
             raise ModelError(
                 f"'{self.tree.freedom_names[worst]}' moves no inertia: give what it carries a mass off its axis or an inertia"
             )
+
+
+def _idle(inertia: np.ndarray, v: slice) -> list[int]:
+    """The degrees of freedom v of a joint that move nothing but rounding, against the others that turn about it."""
+    turning = range(v.start, v.stop)[-3:]
+    largest = max(inertia[k] for k in turning)
+    return [k for k in turning if not inertia[k] > ROUNDING * largest]

@@ -146,6 +146,15 @@ def test_joint_that_moves_no_inertia_is_refused_by_name():
         Simulator(Tree([Part("bead", bead)], [spin]))
 
 
+def test_point_mass_on_a_ball_joint_is_refused_by_name():
+    """Nothing to turn about the line to it; what rounding makes of zero, of either sign, does not count."""
+    for place in ([0.0, 0.0, -1.0], [0.3, -0.2, 0.7]):
+        bob = MassProperties(1.0, np.array(place), np.zeros((3, 3)))
+        tree = Tree([Part("bob", bob)], [Joint("ball", JointKind.SPHERICAL, "world", "bob")])
+        with pytest.raises(ModelError, match="'ball/[xyz]' moves no inertia"):
+            Simulator(tree)
+
+
 def test_posture_without_inertia_is_refused():
     """Two thin rods in line on a free root: nothing resists a turn about the line. Bent, as when it is built, all is well."""
     rod = inertia.rod(1.0, 1.0)

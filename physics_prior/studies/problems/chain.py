@@ -3,7 +3,10 @@
 import numpy as np
 
 from physics_prior import inertia
+from physics_prior.effects import Effect
+from physics_prior.effects.attachment import Attachment
 from physics_prior.effects.gravity import Gravity
+from physics_prior.errors import ModelError
 from physics_prior.inertia import MassProperties
 from physics_prior.model import Joint, JointKind, Part, Tree
 from physics_prior.studies.bench_models import humanlike
@@ -63,7 +66,7 @@ def thrown_human() -> Mechanism:
 def scaled(mechanism: Mechanism, length: float, mass: float) -> Mechanism:
     """The same mechanism in other units of length and mass: lengths, masses and gravity times as much, times unchanged.
 
-    Its trees may have revolute and ball joints; its effects, gravity only.
+    Its effects may be gravity and attachments.
     """
     parts = [
         Part(
@@ -80,5 +83,13 @@ def scaled(mechanism: Mechanism, length: float, mass: float) -> Mechanism:
         Joint(j.name, j.kind, j.parent, j.child, length * j.position, j.orientation, j.axis)
         for j in mechanism.tree.joints
     ]
-    effects = tuple(Gravity(acceleration=tuple(length * e.field())) for e in mechanism.effects)
-    return Mechanism(Tree(parts, joints), effects, mechanism.q, mechanism.v)
+    effects: list[Effect] = []
+    for effect in mechanism.effects:
+        if isinstance(effect, Gravity):
+            effects.append(Gravity(acceleration=tuple(length * effect.field())))
+        elif isinstance(effect, Attachment):
+            ends = {"point": tuple(length * np.array(effect.point)), "at": tuple(length * np.array(effect.at))}
+            effects.append(effect.model_copy(update=ends))
+        else:
+            raise ModelError(f"a mechanism with a '{effect.kind}' cannot be scaled: only gravity and attachments can")
+    return Mechanism(Tree(parts, joints), tuple(effects), mechanism.q, mechanism.v)

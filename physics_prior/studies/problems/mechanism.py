@@ -31,10 +31,10 @@ class Mechanism:
     tau: np.ndarray | None = None
 
     def run(self, integrator: IntegratorName = DEFAULT, effects: Sequence[Effect] | None = None) -> "Run":
-        """A motion that begins at the start, put onto the constraints; effects other than its own where given."""
+        """A motion that begins at the start, put onto what holds; effects other than its own where given."""
         simulator = Simulator(self.tree, self.effects if effects is None else effects, integrator)
         run = Run(simulator, self.q.copy(), self.v.copy(), self.tau)
-        simulator.project(run.q, run.v)
+        simulator.begin(run.q, run.v)
         return run
 
 

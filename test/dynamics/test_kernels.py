@@ -151,7 +151,7 @@ def test_point_mass_on_a_ball_joint_is_refused_by_name():
     for place in ([0.0, 0.0, -1.0], [0.3, -0.2, 0.7]):
         bob = MassProperties(1.0, np.array(place), np.zeros((3, 3)))
         tree = Tree([Part("bob", bob)], [Joint("ball", JointKind.SPHERICAL, "world", "bob")])
-        with pytest.raises(ModelError, match="'ball/[xyz]' moves no inertia"):
+        with pytest.raises(ModelError, match=r"'ball/[xyz]' moves no inertia"):
             Simulator(tree)
 
 

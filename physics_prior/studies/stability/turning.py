@@ -5,7 +5,15 @@ from itertools import product
 import numpy as np
 
 from physics_prior import rotations
+from physics_prior.effects.joint_spring import JointSpring
 from physics_prior.errors import ModelError
+from physics_prior.estimation.estimator import Estimator
+from physics_prior.estimation.measurement import PoseMeasurement
+from physics_prior.inertia import MassProperties
+from physics_prior.model import Joint, JointKind, Part, Tree
+from physics_prior.scene import load_scene
+from physics_prior.studies.problems.chain import hung_human, thrown_human
+from physics_prior.studies.problems.mechanism import Mechanism
 from physics_prior.studies.stability.case import Check, Measurements, case
 
 SIGNS = np.array([axis for axis in product((-1.0, 0.0, 1.0), repeat=3) if any(axis)])

@@ -27,7 +27,8 @@ RETRY = 0.25  # a step without solution is taken in parts so much shorter
 def attempt(memory: Array, q: Array, v: Array, extra: Array, h: float) -> tuple[int, float]:
     """Move q (nq,) and v (nv,) in place by h seconds; return the constraints' rank and h.
 
-    Where Newton's method does not converge nothing is moved: then return -2 (-1 if not finite) and a step that may do.
+    Where Newton's method does not converge nothing is moved: then return -2 (-1 if not finite) and a step that may do. It
+    must do so monotonically (Deuflhard 2004, 2.1): what it reached by a detour would be another solution, many turns away.
     """
     links, _, _, rows, _, start, spare, _ = sections(memory)
     nv, inner, time = v.shape[0], workspace(memory), memory[TIME]
@@ -55,6 +56,8 @@ def attempt(memory: Array, q: Array, v: Array, extra: Array, h: float) -> tuple[
         if not math.isfinite(moved + scale):
             return -1, RETRY * h
         shrunk = moved / before if iteration > 0 else 1.0
+        if slow and shrunk > 1.0 and moved > STALL * scale:
+            break
         if moved * shrunk <= ROUNDING * scale or (shrunk > 0.5 and moved <= STALL * scale):
             theta = spare[4]
             clear(theta)

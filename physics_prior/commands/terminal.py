@@ -26,8 +26,8 @@ def console() -> Console:
 
 
 @contextmanager
-def progress(what: str) -> Iterator[Callable[[float], None]]:
-    """A progress bar; tell it the fraction that is done."""
+def progress(what: str) -> Iterator[Callable[..., None]]:
+    """A progress bar; tell it the fraction that is done and, where that changes, what comes next."""
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -41,7 +41,7 @@ def progress(what: str) -> Iterator[Callable[[float], None]]:
     )
     with bar:
         task = bar.add_task(what, total=1.0)
-        yield lambda fraction: bar.update(task, completed=fraction)
+        yield lambda fraction, now=what: bar.update(task, completed=fraction, description=now)
 
 
 @contextmanager

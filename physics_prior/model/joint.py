@@ -7,6 +7,7 @@ import numpy as np
 
 from physics_prior import rotations
 from physics_prior.errors import ModelError
+from physics_prior.inertia import LARGEST_NUMBER
 
 
 class JointKind(IntEnum):
@@ -70,11 +71,12 @@ class Joint:
     def __post_init__(self) -> None:
         position = np.asarray(self.position, dtype=float)
         axis = np.asarray(self.axis, dtype=float)
-        if position.shape != (3,) or not np.all(np.isfinite(position)):
+        if position.shape != (3,) or not np.all(np.abs(position) <= LARGEST_NUMBER):
             raise ModelError(
-                f"joint '{self.name}': position {self.position} is not valid: give three finite numbers [m]"
+                f"joint '{self.name}': position {self.position} is not valid: give three finite numbers up to 1e60 [m]"
             )
-        length = float(np.linalg.norm(axis)) if axis.shape == (3,) else 0.0
+        with np.errstate(over="ignore"):
+            length = float(np.linalg.norm(axis)) if axis.shape == (3,) else 0.0
         if not np.isfinite(length) or length < 1e-9:
             raise ModelError(
                 f"joint '{self.name}': axis {self.axis} is not valid: give three finite numbers, not all zero"

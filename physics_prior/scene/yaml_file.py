@@ -1,6 +1,7 @@
 """YAML files read so that every value knows its line, hostile ones refused before they cost anything."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -114,7 +115,7 @@ class Place:
     def error(self, message: str, key: str | None = None) -> SceneError:
         """Return the error `FILE:LINE: LOCATION: message`, on the line of the entry `key` if there is one."""
         node = self._node.content[key] if key is not None and key in self else self._node
-        where = "".join(_step(key) for key in self.location).removeprefix(".")
+        where = _where(self.location)
         return SceneError(f"{self.path}:{node.line}: {where + ': ' if where else ''}{message}")
 
 
@@ -160,6 +161,7 @@ class _Builder:
         self.events = yaml.parse(text, Loader=yaml.SafeLoader)
         self.anchors: dict[str, _Node] = {}
         self.values = 0
+        self.location: list[str | int] = []
 
     def build(self) -> _Node:
         self.next()  # start of the stream
@@ -194,6 +196,12 @@ class _Builder:
             self.anchors[event.anchor] = node
         return node
 
+    def inner(self, key: str | int, event: Any, depth: int) -> _Node:
+        self.location.append(key)
+        node = self.node(event, depth)
+        self.location.pop()
+        return node
+
     def content(self, event: Any, depth: int) -> _Node:
         line = _line(event)
         if isinstance(event, yaml.ScalarEvent):
@@ -201,7 +209,7 @@ class _Builder:
         if isinstance(event, yaml.SequenceStartEvent):
             children = []
             while not isinstance(inner := self.next(), yaml.SequenceEndEvent):
-                children.append(self.node(inner, depth + 1))
+                children.append(self.inner(len(children), inner, depth + 1))
             return self.collection(line, children, children)
         mapping: dict[str, _Node] = {}
         while not isinstance(key := self.next(), yaml.MappingEndEvent):
@@ -211,7 +219,7 @@ class _Builder:
             name = self.text(key)
             if name in mapping:
                 raise self.error(key, f"key {shown(name)} is given twice, on line {mapping[name].line} too")
-            value = self.node(self.next(), depth + 1)
+            value = self.inner(name, self.next(), depth + 1)
             mapping[name] = _Node(_line(key), value.content, value.size, value.depth)
         return self.collection(line, mapping, list(mapping.values()))
 
@@ -230,11 +238,11 @@ class _Builder:
         if not event.implicit[0]:  # quoted, or a block of text
             return text
         if _NOT_FINITE.fullmatch(text):
-            raise self.error(event, f"{text} is not a finite number")
+            raise self.error(event, f"{self.field()}{text} is not a finite number")
         if _NUMBER.fullmatch(text):
             number = float(text)
             if abs(number) > LARGEST_NUMBER:
-                raise self.error(event, f"{text[:80]} is too large: numbers go up to {LARGEST_NUMBER:g}")
+                raise self.error(event, f"{self.field()}{text[:80]} is too large: numbers go up to {LARGEST_NUMBER:g}")
             return int(number) if number.is_integer() and abs(number) < 2**53 else number
         return _WORDS.get(text.lower(), text)
 
@@ -242,6 +250,10 @@ class _Builder:
         self.values += values
         if self.values > MAXIMUM_VALUES:
             raise self.error(event, f"has more than {MAXIMUM_VALUES} values, those behind aliases included")
+
+    def field(self) -> str:
+        where = _where(self.location)
+        return where + ": " if where else ""
 
     def error(self, event: Any, message: str) -> SceneError:
         return SceneError(f"{self.path}:{_line(event)}: {message}")
@@ -261,6 +273,10 @@ def suggestion(name: object, known: list[str]) -> str:
     """Return ` (did you mean 'NAME'?)` for the nearest of the known names, or nothing if none is near."""
     near = get_close_matches(str(name), known, n=1)
     return f" (did you mean '{near[0]}'?)" if near else ""
+
+
+def _where(location: Sequence[str | int]) -> str:
+    return "".join(_step(key) for key in location).removeprefix(".")
 
 
 def _step(key: str | int) -> str:

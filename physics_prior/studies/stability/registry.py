@@ -1,14 +1,14 @@
 """Every hard case, in the order of the list."""
 
 from physics_prior.errors import PhysicsPriorError
-from physics_prior.studies.stability import loops, models, ratios, smooth, spinning, stiff, touching, turning
+from physics_prior.studies.stability import inputs, loops, models, ratios, smooth, spinning, stiff, touching, turning
 from physics_prior.studies.stability.case import Case
 
 CASES: tuple[Case, ...] = tuple(
     sorted(
         (
             thing
-            for family in (smooth, loops, stiff, spinning, ratios, turning, models, touching)
+            for family in (smooth, loops, stiff, spinning, ratios, turning, models, touching, inputs)
             for thing in vars(family).values()
             if isinstance(thing, Case)
         ),

@@ -129,10 +129,8 @@ def zeno_ball(thorough: bool) -> Measurements:
 def _tops(heights: np.ndarray, rates: np.ndarray) -> np.ndarray:
     """Heights to which energy would carry the ball between one impact and the next, the first of its fall, m."""
     reach = heights + rates**2 / (2.0 * G)
-    tops = [reach[0]]
-    for up in np.flatnonzero((rates[:-1] < 0.0) & (rates[1:] > 0.0)):
-        tops.append(reach[up + 1])
-    return np.array(tops)
+    ups = np.flatnonzero((rates[:-1] < 0.0) & (rates[1:] > 0.0)) + 1
+    return np.concatenate([reach[:1], reach[ups]])
 
 
 @case(28, "A block on an incline, friction 1 % above and below its slope", "textbook")

@@ -18,6 +18,7 @@ from physics_prior.commands.terminal import STDOUT, console, progress, require_f
 from physics_prior.errors import PhysicsPriorError
 
 PASSED, FAILED = 0, 1
+LINE_WIDTH = 260  # one line a case, where it is not a terminal that is narrower
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json is not None:
         write_json(args.json, found)
     if args.json != STDOUT:
-        console().print(table(outcomes))
+        console(LINE_WIDTH).print(table(outcomes))
     return FAILED if found["failed"] else PASSED
 
 

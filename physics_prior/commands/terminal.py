@@ -19,9 +19,9 @@ STDOUT = "-"
 FILE_WIDTH = 120
 
 
-def console() -> Console:
+def console(file_width: int = FILE_WIDTH) -> Console:
     """Where results go; a file or pipe has no width, so that it gets one that tables fit in."""
-    width = None if sys.stdout.isatty() else FILE_WIDTH
+    width = None if sys.stdout.isatty() else file_width
     return Console(file=sys.stdout, highlight=False, markup=False, width=width)
 
 

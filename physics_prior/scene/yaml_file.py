@@ -207,7 +207,7 @@ class _Builder:
         if isinstance(event, yaml.ScalarEvent):
             return _Node(line, self.scalar(event))
         if isinstance(event, yaml.SequenceStartEvent):
-            children = []
+            children: list[_Node] = []
             while not isinstance(inner := self.next(), yaml.SequenceEndEvent):
                 children.append(self.inner(len(children), inner, depth + 1))
             return self.collection(line, children, children)

@@ -27,7 +27,7 @@ def draw(outcomes: Sequence[Outcome], folder: Path) -> None:
 
 def _margins(outcomes: Sequence[Outcome]) -> Figure:
     """One bar a case: how many times its tightest figure fits into its bound."""
-    figure = Figure(figsize=(11.0, 1.6 + 0.34 * len(outcomes)), dpi=110, layout="constrained")
+    figure = Figure(figsize=(12.0, 1.6 + 0.34 * len(outcomes)), dpi=110, layout="constrained")
     axes = figure.add_subplot()
     for row, outcome in enumerate(outcomes):
         margin = outcome.tightest.margin
@@ -40,7 +40,7 @@ def _margins(outcomes: Sequence[Outcome]) -> Figure:
     )
     axes.invert_yaxis()
     axes.set_xscale("log")
-    axes.set_xlim(0.1, MOST * 1e6)
+    axes.set_xlim(0.1, MOST * 1e7)
     axes.set_xticks([10.0**k for k in range(0, 9, 2)])
     axes.axvline(1.0, color=FAILED, lw=1.2)
     axes.text(1.0, -0.9, "bound", color=FAILED, fontsize=8, ha="center")
@@ -78,9 +78,9 @@ def _picture(picture: Picture) -> Figure:
     for text, level in picture.levels:
         ours = text.startswith("bound")
         axes.axhline(level, color=FAILED if ours else "#777777", lw=1.1, ls="-" if ours else "--", zorder=0.5)
-        axes.text(
-            0.995, level, text, transform=axes.get_yaxis_transform(), ha="right", va="bottom", fontsize=7.5, color=INK
-        )
+        side, align = (0.005, "left") if ours else (0.995, "right")
+        place = axes.get_yaxis_transform()
+        axes.text(side, level, text, transform=place, ha=align, va="bottom", fontsize=7.5, color=INK)
     axes.set_title(picture.title, loc="left", fontsize=10)
     axes.set_xlabel(picture.x, fontsize=8)
     axes.set_ylabel(picture.y, fontsize=8)

@@ -111,11 +111,11 @@ def table(outcomes: Sequence[Outcome]) -> Table:
         padding=(0, 2, 0, 0),
     )
     out.add_column("", justify="right", header_style="dim")
-    out.add_column("case", ratio=3, header_style="dim")
-    out.add_column("measured", ratio=4, header_style="dim")
+    out.add_column("case", header_style="dim")
+    out.add_column("measured", header_style="dim")
     for name in ("figure", "bound", "margin"):
         out.add_column(name, justify="right", no_wrap=True, header_style="dim")
-    out.add_column("others", ratio=3, header_style="dim", style="dim")
+    out.add_column("others", header_style="dim", style="dim")
     for outcome in outcomes:
         case, check = outcome.case, outcome.tightest
         figure = f"{check.measured:.2g} {check.unit}".strip() if math.isfinite(check.measured) else "none"

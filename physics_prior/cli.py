@@ -73,7 +73,7 @@ def make_parser(words: Sequence[str]) -> argparse.ArgumentParser:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="version", version=f"physics-prior {__version__}")
+    parser.add_argument("-V", "--version", action="version", version=f"physics-prior {__version__}")
     parser.set_defaults(run=None)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND")
     for name, (module_name, summary) in COMMANDS.items():

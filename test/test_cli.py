@@ -49,6 +49,23 @@ readouts:
   - energy: total
 """
 
+TABLE = """
+description: a box, a rod and a ball about to land
+model:
+  parts:
+    box: {mass: 1, inertia: {box: [0.2, 0.2, 0.2]}, joint: free}
+    rod: {mass: 1, inertia: {capsule: {radius: 0.05, length: 0.4}}, joint: {kind: prismatic, axis: x, name: rail}}
+    ball: {mass: 1, inertia: {sphere: 0.1}, joint: free}
+effects:
+  - gravity
+  - contact: {name: floor, part: box, friction: 0.5}
+  - contact: {name: rods, part: rod, to: box}
+  - contact: {name: bowl, part: ball, friction: 0.5, rolling: 1 mm, to: rod}
+  - joint_limit: {name: stop, lower: {rail: -1}, upper: {rail: 1}}
+measurements: []
+initial: {positions: {box: {position: [0, 0, 1]}, ball: {position: [0, 2, 1]}, rail: 0.5}}
+"""
+
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory):
@@ -195,6 +212,17 @@ def test_check_tells_what_is_simulated_and_what_it_costs(capsys):
         "us here; with its derivatives",
     ):
         assert fact in out
+
+
+def test_check_tells_rows_of_what_may_touch(capsys, tmp_path):
+    (tmp_path / "table.yaml").write_text(TABLE)
+    code, out, err = run(capsys, "check", tmp_path / "table.yaml")
+    assert (code, err) == (0, "")
+    rows = {line.split()[0]: line.split()[-1] for line in out.splitlines() if "up to" in line and line.split()}
+    # eight points of a box on a plane with friction; two of a capsule without, one of a ball with rolling; a stop
+    assert (rows["floor"], rows["rods"], rows["bowl"], rows["stop"]) == ("24", "2", "5", "1")
+    assert "none beside the joints; up to 32 rows while something touches" in out
+    assert "constraint_forces/floor" in out
 
 
 def test_check_knows_every_kind_of_source_and_readout(capsys, tmp_path):

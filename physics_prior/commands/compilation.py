@@ -8,7 +8,7 @@ from physics_prior.dynamics.compose import kinds_of_rows, step_module
 from physics_prior.dynamics.kernel import cache_directory
 from physics_prior.scene import Scene
 
-DURATION = "~20 s"
+DURATION, WITH_CONTACT = "~20 s", "~1 min"
 
 
 @contextmanager
@@ -17,5 +17,6 @@ def compiling(scene: Scene, kernel: str) -> Iterator[None]:
     constrained, touching = kinds_of_rows(scene.tree, scene.effects)
     step = step_module(scene.effects, constrained, scene.step.integrator, touching).__name__
     cached = any(cache_directory().glob(f"*/{step}.{kernel}-*.nbc"))
-    with status(f"loading {scene.name}" if cached else f"compiling the step of {scene.name}, once: {DURATION}"):
+    duration = WITH_CONTACT if touching else DURATION
+    with status(f"loading {scene.name}" if cached else f"compiling the step of {scene.name}, once: {duration}"):
         yield

@@ -9,7 +9,9 @@ from rich.table import Table
 from physics_prior.commands.compilation import compiling
 from physics_prior.commands.terminal import console, table
 from physics_prior.dynamics.compose import kinds_of_rows, step_source
+from physics_prior.dynamics.contact.geometry.manifold import SLOTS
 from physics_prior.dynamics.simulator import Simulator
+from physics_prior.effects import Effect
 from physics_prior.interface import topics_of
 from physics_prior.scene import (
     AngleReadout,
@@ -26,6 +28,8 @@ from physics_prior.scene import (
     SwitchSource,
 )
 
+MOST_POINTS = {"sphere": 1, "ellipsoid": 1, "capsule": 2, "box": SLOTS, "plane": SLOTS}
+"""At how many points a surface can touch another."""
 ROUNDS, STEPS, LINEARISATIONS = 15, 100, 10  # of timing: medians over rounds
 
 
@@ -60,12 +64,22 @@ def _model(scene: Scene) -> Table:
 def _effects(scene: Scene) -> Table:
     out = table("effects: these and nothing else", "effect", "kind", "what it does", "rows", numbers=1)
     for effect in scene.effects:
-        pairs = effect.point_pairs(scene.tree)
-        rows = sum(1 if pair.length is not None else len(pair.directions) for pair in pairs)
-        out.add_row(effect.label, effect.kind, effect.explain(scene.tree), str(rows or ""))
+        equal, unequal = _rows(scene, effect)
+        rows = f"up to {unequal}" if unequal else str(equal or "")
+        out.add_row(effect.label, effect.kind, effect.explain(scene.tree), rows)
     if not scene.effects:
         out.add_row("none", "", "nothing acts on the body", "")
     return out
+
+
+def _rows(scene: Scene, effect: Effect) -> tuple[int, int]:
+    """Rows of an effect: those that hold, and at most how many while something touches (contact/geometry tells points)."""
+    equal = sum(1 if pair.length is not None else len(pair.directions) for pair in effect.point_pairs(scene.tree))
+    unequal = len(effect.joint_ranges(scene.tree))
+    for pair in effect.touching_pairs(scene.tree):
+        points = min(MOST_POINTS[surface.kind] for surface in (pair.a, pair.b))
+        unequal += points * (1 + 2 * (pair.friction > 0.0) + 2 * (pair.rolling > 0.0))
+    return equal, unequal
 
 
 def _measurements(scene: Scene) -> Table:
@@ -129,7 +143,7 @@ def _state(scene: Scene, simulator: Simulator) -> Table:
     step, with_derivatives = _cost(scene, simulator)
     out = table("state and step", "", "")
     out.add_row("state", f"q {simulator.nq}, v {simulator.nv}; error state {2 * simulator.nv}")
-    out.add_row("constraints", _constraints(simulator))
+    out.add_row("constraints", _constraints(scene, simulator))
     own = [topic for topic in topics_of(scene) if not topic.endswith("/stddev")]
     out.add_row("publishes", ", ".join(own) + "; of joints and forces also TOPIC/stddev")
     out.add_row("step", f"{scene.step.integrator}, {scene.step.size * 1e3:g} ms")
@@ -138,7 +152,12 @@ def _state(scene: Scene, simulator: Simulator) -> Table:
     return out
 
 
-def _constraints(simulator: Simulator) -> str:
+def _constraints(scene: Scene, simulator: Simulator) -> str:
+    most = sum(_rows(scene, effect)[1] for effect in scene.effects)
+    return _equalities(simulator) + (f"; up to {most} rows while something touches" if most else "")
+
+
+def _equalities(simulator: Simulator) -> str:
     if simulator.rows == 0:
         return "none beside the joints"
     acting = simulator.switches.rows

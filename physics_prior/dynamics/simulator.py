@@ -357,8 +357,11 @@ class Simulator:
         array, h = self.memory.array, self.interval
         self.rank = self.step.evaluate(array, q, v, extra, 0.0, vdot)
         if self.touching:
-            # contact forces are the impulses of a step to come, over its time
+            # contact forces are the impulses of a step to come, over its time; anchors stand where it ends
+            now, self.time = self.time, self.time + h
+            self._move_anchors()
             impulse.resolve(array, q, v + h * vdot, h, False)
+            self.time = now
             self.step.evaluate(array, q, v, extra, 0.0, vdot)
             impulse.load_contacts(array, h)
             vdot += self.memory.spare[1] / h

@@ -5,6 +5,7 @@ the integrator's own, of its own order. Where something is reached at speed the 
 from the impact: at most one in a step. What touches is stepped at velocity level, semi-implicitly (order one).
 """
 
+from physics_prior.dynamics.anchor_motion import move_anchors
 from physics_prior.dynamics.arrays import clear, copy
 from physics_prior.dynamics.contact.detect import TOUCHING, look
 from physics_prior.dynamics.contact.impulse import impact, push_out, resolve, urgency
@@ -26,18 +27,19 @@ EXACT = 1e-13  # m or rad: gap at the time of impact
 @kernel
 def contact_step(memory: Array, q: Array, v: Array, extra: Array, h: float) -> int:
     """Move q (nq,) and v (nv,) in place by h seconds, everything within reach being a contact; return the rank."""
-    links, _, _, _, _, _, spare, _ = sections(memory)
+    links, work, pairs, _, _, _, spare, parameters = sections(memory)
     vdot, theta = spare[3], spare[4]
     rank = evaluate(memory, q, v, extra, h, vdot)
     for k in range(v.shape[0]):
         v[k] += h * vdot[k]
+    memory[TIME] += h
+    move_anchors(work, pairs, parameters, memory[TIME])
     resolve(memory, q, v, h, False)
     for k in range(v.shape[0]):
         theta[k] = h * v[k]
     displace(links, q, theta, q)
     settle(memory, q, v)
     push_out(memory, q)
-    memory[TIME] += h
     return rank
 
 

@@ -10,7 +10,7 @@ import math
 from physics_prior.dynamics.algebra import add3, cross, get3, minus, plus, scale
 from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.articulated_body import factorize
-from physics_prior.dynamics.constraint import position_error, refresh, row_count, velocity_error
+from physics_prior.dynamics.constraint import direction, position_error, refresh, row_count, velocity_error
 from physics_prior.dynamics.contact.complementarity import DISC, complement
 from physics_prior.dynamics.contact.detect import TOUCHING, collect, look
 from physics_prior.dynamics.contact.memory import contact_sections, remember, remembered
@@ -189,7 +189,7 @@ def load_contacts(memory: Array, h: float) -> None:
 
     For ``transmit``; needs ``evaluate`` at the state after ``resolve``. The change of vdot stands in the second spare vector.
     """
-    links, work, _, _, _, _, spare, _ = sections(memory)
+    links, work, pairs, _, _, _, spare, _ = sections(memory)
     candidates, contacts, _, YZ, _, vectors, _ = contact_sections(memory)
     count, m = remembered(memory)
     respond_to(links, work, YZ[1], vectors[4], m, spare[0], spare[1])
@@ -198,6 +198,11 @@ def load_contacts(memory: Array, h: float) -> None:
         add3(here.alpha, scale(1.0 / h, get3(here.delta_alpha)))
         add3(here.acceleration, scale(1.0 / h, get3(here.delta_acceleration)))
     store_forces(candidates, contacts, count, vectors[4], h)
+    for p in range(pairs.shape[0] if m > 0 else 0):
+        # what contact adds to the forces of equality rows
+        pair = pairs[p]
+        for row in range(pair.rows):
+            add3(pair.force, scale(vectors[4, pair.first + row] / h, direction(pair, row)))
     for i in range(candidates.shape[0]):
         candidate = candidates[i]
         if not candidate.is_limit:

@@ -61,13 +61,11 @@ class Simulator:
         self.tree, self.effects, self.integrator = tree, tuple(effects), integrator
         self._labels: list[tuple[str, int, int]] = []
         pairs: list[PointPair] = []
-        holding: list[Effect] = []
         for effect in effects:
             own = effect.point_pairs(tree)
             if own:
                 self._labels.append((effect.label, len(pairs), len(pairs) + len(own)))
                 pairs.extend(own)
-                holding.append(effect)
         touching = [pair for effect in effects for pair in effect.touching_pairs(tree)]
         ranges = [each for effect in effects for each in effect.joint_ranges(tree)]
         candidates = candidate_records(tree, ranges, touching)
@@ -108,7 +106,7 @@ class Simulator:
         self._tangent = np.zeros(0)
         self._stores = any(effect.compiled is not None and effect.compiled.energy is not None for effect in effects)
         self._posed = np.zeros(self.nq)
-        self.switches = Switches(self, holding, [(first, last) for _, first, last in self._labels])
+        self.switches = Switches(self, [(first, last) for _, first, last in self._labels])
         self._check_inertia()
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray | None = None) -> np.ndarray:
@@ -180,7 +178,6 @@ class Simulator:
 
     def begin(self, q: np.ndarray, v: np.ndarray) -> None:
         """Begin the scene at q and v: time zero, and what holds then takes hold; SimulationError if it cannot."""
-        self.time = 0.0
         self.switches.begin(q, v)
 
     def displaced(self, q: np.ndarray, delta: np.ndarray) -> np.ndarray:

@@ -11,7 +11,6 @@ from physics_prior.dynamics.anchor_motion import displaced_anchor
 from physics_prior.dynamics.assembly import ASSEMBLED, assemble, turned_over
 from physics_prior.dynamics.records import pair_records
 from physics_prior.dynamics.wrench import Wrench
-from physics_prior.effects.effect import Effect
 from physics_prior.effects.holding import Holding
 from physics_prior.errors import ModelError, SimulationError
 
@@ -61,10 +60,11 @@ class Stretch:
 class Switches:
     """The effects of a simulator that hold something, each with its point pairs [first, last) in the memory."""
 
-    def __init__(self, simulator: "Simulator", effects: Sequence[Effect], spans: Sequence[tuple[int, int]]) -> None:
-        self._simulator, self.effects, self.spans = simulator, tuple(effects), tuple(spans)
-        self.labels = [effect.label for effect in effects]
-        self._holds = tuple(Hold(True) for _ in effects)
+    def __init__(self, simulator: "Simulator", spans: Sequence[tuple[int, int]]) -> None:
+        self._simulator, self.spans = simulator, tuple(spans)
+        self.effects = tuple(effect for effect in simulator.effects if effect.point_pairs(simulator.tree))
+        self.labels = [effect.label for effect in self.effects]
+        self._holds = tuple(Hold(True) for _ in self.effects)
         for index, (first, last) in enumerate(spans):
             simulator.memory.pairs["here"][first:last] = self._here(index)
         self.holds = self.told([effect.active_at(0.0) for effect in self.effects])
@@ -114,6 +114,7 @@ class Switches:
 
     def begin(self, q: np.ndarray, v: np.ndarray) -> None:
         """Have what holds at time zero take hold at q and v, which are put in place onto all of it."""
+        self._simulator.time = 0.0
         for index, effect in enumerate(self.effects):
             self.holds = self.switched(index, effect.active_at(0.0), q)
         self.take_hold(q, v)

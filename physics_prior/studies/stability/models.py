@@ -27,7 +27,7 @@ def refused(make: Callable[[], object], *named: str) -> float:
 @case(
     23,
     "Massless links: between joints, and at the end",
-    "drake #17081, #16992: the cross of a U-joint is refused or NaN",
+    "drake #17081, #16992",
 )
 def massless_links(thorough: bool) -> Measurements:
     """A universal joint's cross without mass moves as one of 1e-9 kg does; a massless end is refused by its name."""

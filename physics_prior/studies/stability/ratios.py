@@ -41,7 +41,7 @@ def mass_ratios(thorough: bool) -> Measurements:
 @case(
     14,
     "Mass ratio of 1e6 through attachments",
-    "MuJoCo's joint opens 1.3e-3 to 0.15 m; Bullet, Jolt: springy",
+    "MuJoCo's joint opens 1.3e-3 to 0.15 m; Jolt #1392",
 )
 def attached_mass_ratios(thorough: bool) -> Measurements:
     """The same pendulums as free bodies, held by attachments, in 3D: the gap of the joints, and the tree's motion."""
@@ -86,7 +86,7 @@ def _thick(part: Part) -> np.ndarray:
 @case(
     16,
     "A chain of 100 links",
-    "MuJoCo: 26 to 35 times the cost of 10 links; Bullet's stretch",
+    "MuJoCo: 26 to 35 times the cost of 10 links; bullet3 #471",
 )
 def long_chain(thorough: bool) -> Measurements:
     """10 m of chain, let go from 45 deg; energy error of the largest kinetic energy, and what ten times the links cost."""
@@ -137,7 +137,7 @@ def let_go(thorough: bool) -> Measurements:
         yield Check(f"energy over 2 s, small steps, {name}, relative", float(np.max(np.abs(error))) / moving, 1e-6)
 
 
-@case(25, "Tiny links, and other units", "mujoco #168, #989: small bodies are unstable")
+@case(25, "Tiny links, and other units", "mujoco #168, #989")
 def scales(thorough: bool) -> Measurements:
     """A link of 1e-12 of its neighbour's inertia; the same motion in millimetres and grams, and in kilometres and tons."""
     for name, mechanism in (("at the tip", _tiny(at_tip=True)), ("between", _tiny(at_tip=False))):

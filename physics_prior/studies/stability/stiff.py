@@ -62,7 +62,7 @@ def stiff_governor(thorough: bool) -> Measurements:
     )
 
 
-@case(8, "Stiff position control, omega h from 0.1 to 100", "mujoco #3443: implicitfast gains energy")
+@case(8, "Stiff position control, omega h from 0.1 to 100", "mujoco #3443")
 def stiff_control(thorough: bool) -> Measurements:
     """Springs and dampers hold the joints of a two-link arm, damped critically, a little, and not at all."""
     rises, left, curves = 0.0, 0.0, []
@@ -101,7 +101,7 @@ def _held(name: IntegratorName, omega_h: float, ratio: float) -> np.ndarray:
     return np.array(out)
 
 
-@case(9, "Strong joint damping, C h / I = 100", "gz-physics #803: it oscillates and explodes")
+@case(9, "Strong joint damping, C h / I = 100", "gz-physics #803")
 def strong_damping(thorough: bool) -> Measurements:
     """A wheel and an arm: the rate falls at every step and never changes its sign."""
     wheel = Tree(

@@ -96,7 +96,7 @@ def _followed(mechanism: Mechanism, seconds: float) -> tuple[np.ndarray, np.ndar
 @case(
     27,
     "A bouncing ball comes to rest (Zeno), e = 0.5, 0.9",
-    "drake PR #7943: event after event without end",
+    "drake PR #7943",
 )
 def zeno_ball(thorough: bool) -> Measurements:
     """Dropped from 1 m: every bounce is e^2 as high, and the ball rests after t1 (1 + e) / (1 - e)."""

@@ -51,6 +51,12 @@ class Contact(Effect):
     restitution_deviation: float = Field(
         default=0.0, ge=0.0, le=1.0, description="standard deviation of the restitution, for the estimator"
     )
+    impulse_deviation: float = Field(
+        default=0.0,
+        ge=0.0,
+        description="standard deviation of an impact's impulse about what the law says, along the normal and each way across"
+        " it, over the normal impulse, for the estimator",
+    )
     quiet: float = Field(default=1e-2, ge=0.0, description="m/s; slower approach does not bounce")
     velocity: Vector = Field(
         default=(0.0, 0.0, 0.0), description="m/s, world axes, of the other surface's material (a treadmill's belt)"
@@ -85,6 +91,7 @@ class Contact(Effect):
             quiet=self.quiet,
             friction_deviation=self.friction_deviation,
             restitution_deviation=self.restitution_deviation,
+            impulse_deviation=self.impulse_deviation,
             velocity=np.array(self.velocity),
         )
         return [pair]

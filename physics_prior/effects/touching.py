@@ -54,6 +54,7 @@ class TouchingPair:
         friction: Coulomb's coefficient; rolling: m, moment of rolling resistance over normal force.
         restitution, quiet: as of ``JointRange``.
         friction_deviation, restitution_deviation: how uncertain they are, for the filter.
+        impulse_deviation: how far the impulse of an impact may be off the law's, as a share of it, for the filter.
         velocity: (3,) m/s, world axes, of surface a's material where it moves though its part does not (a treadmill).
     """
 
@@ -65,4 +66,5 @@ class TouchingPair:
     quiet: float
     friction_deviation: float
     restitution_deviation: float
+    impulse_deviation: float
     velocity: np.ndarray

@@ -16,7 +16,7 @@ from physics_prior.estimation import switching
 from physics_prior.estimation.measurement import ForceMeasurement, Measurement, SwitchCommand, command_topic
 from physics_prior.estimation.observation import Innovation, check, innovation
 from physics_prior.estimation.process import Process, State, steps
-from physics_prior.estimation.square_root import innovate, predict_factor
+from physics_prior.estimation.square_root import innovate, predicted_factor
 from physics_prior.scene import MeasurementSource, Scene
 
 ITERATIONS = 5  # of the update, where one linearisation does not do
@@ -87,12 +87,8 @@ class Filter:
         self.enter(posterior)
         count, h = steps((stamp - posterior.stamp) * 1e-9, self.scene.step.size)
         state, factor = posterior.state.copy(), posterior.factor.copy()
-        W: np.ndarray | None = None
         for _ in range(count):
-            F, G = self.process.advance(state, h)
-            if W is None:
-                W = np.empty((len(factor), len(factor) + G.shape[1]))
-            predict_factor(F, factor, G, W)
+            factor = predicted_factor(self.process.carry(state, factor, h))
         if not all(np.isfinite(array).all() for array in (state.q, state.v, state.acceleration, factor)):
             raise SimulationError(
                 f"the prediction is not finite after steps of {h:g} s: a smaller step size or the other integrator may do"
@@ -179,7 +175,7 @@ class Filter:
     @property
     def constrained(self) -> bool:
         """Whether there are constraints that the process knows."""
-        return self.simulator.rows > 0 and self.process.n == 2 * self.simulator.nv
+        return (self.simulator.rows > 0 or len(self.simulator.candidates) > 0) and self.process.n == 2 * self.simulator.nv
 
     def constrain(self, state: State, factor: np.ndarray) -> None:
         """Put state and covariance onto what the simulator holds; what holds its part wherever it is moves with it."""

@@ -13,6 +13,8 @@ from typing import Protocol
 import numpy as np
 
 from physics_prior.dynamics.simulator import Simulator
+from physics_prior.estimation import events
+from physics_prior.estimation.square_root import carry_factor
 from physics_prior.scene import Scene
 
 
@@ -42,6 +44,9 @@ class Process(Protocol):
     def advance(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
         """Move the state in place by h seconds; return its derivative F (n, n) and a noise factor G (n, g)."""
 
+    def carry(self, state: State, factor: np.ndarray, h: float) -> np.ndarray:
+        """Move the state in place by h seconds; return (n, n + g): a factor (n, n) of its errors carried, and one of noise."""
+
     def displace(self, state: State, error: np.ndarray) -> State:
         """The state moved by an error (n,)."""
 
@@ -58,6 +63,15 @@ def steps(seconds: float, size: float) -> tuple[int, float]:
 class _OnManifold:
     def __init__(self, scene: Scene, simulator: Simulator, n: int) -> None:
         self.scene, self.simulator, self.n = scene, simulator, n
+
+    def advance(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
+        raise NotImplementedError
+
+    def carry(self, state: State, factor: np.ndarray, h: float) -> np.ndarray:
+        F, G = self.advance(state, h)
+        W = np.empty((len(F), len(F) + G.shape[1]))
+        carry_factor(F, factor, G, W)
+        return W
 
     def displace(self, state: State, error: np.ndarray) -> State:
         nv = self.simulator.nv
@@ -83,6 +97,11 @@ class PhysicsProcess(_OnManifold):
 
     def advance(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
         return self.simulator.linearise(state.q, state.v, h, self.scene.noise.force)
+
+    def carry(self, state: State, factor: np.ndarray, h: float) -> np.ndarray:
+        if not len(self.simulator.candidates):
+            return super().carry(state, factor, h)
+        return events.carry(self.simulator, state.q, state.v, factor, self.scene.noise.force, h)
 
 
 class KinematicProcess(_OnManifold):

@@ -13,7 +13,7 @@ from physics_prior.dynamics.switches import Hold
 from physics_prior.estimation.filter import Filter, Posterior
 from physics_prior.estimation.history import Node
 from physics_prior.estimation.process import State, steps
-from physics_prior.estimation.square_root import deviations, predict_factor, triangularise
+from physics_prior.estimation.square_root import deviations, predicted_factor
 from physics_prior.estimation.switching import Grip, switch, take_hold
 
 NANOSECONDS = 1e9
@@ -28,8 +28,8 @@ class Step:
     holds: tuple[Hold, ...]
     state: State
     factor: np.ndarray
-    F: np.ndarray
-    G: np.ndarray
+    carried: np.ndarray
+    noise: np.ndarray
     predicted: State
     predicted_factor: np.ndarray
 
@@ -84,12 +84,12 @@ def _steps(filter: Filter, posterior: Posterior, stamp: int) -> list[Step]:
         count, h = steps((stretch.end - stretch.begin) / NANOSECONDS, filter.scene.step.size)
         state, factor = posterior.state, posterior.factor
         for index in range(count):
-            predicted, predicted_factor = state.copy(), factor.copy()
-            F, G = filter.process.advance(predicted, h)
-            predict_factor(F, predicted_factor, G, np.empty((len(F), len(F) + G.shape[1])))
+            predicted, n = state.copy(), len(factor)
+            W = filter.process.carry(predicted, factor, h)
+            carried, noise, expected = W[:, :n].copy(), W[:, n:].copy(), predicted_factor(W)
             began = posterior.stamp + round(index * h * NANOSECONDS)
-            out.append(Step(began, posterior.holds, state, factor, F, G, predicted, predicted_factor))
-            state, factor = predicted, predicted_factor
+            out.append(Step(began, posterior.holds, state, factor, carried, noise, predicted, expected))
+            state, factor = predicted, expected
         posterior = replace(posterior, stamp=begun + stretch.end, state=state, factor=factor)
         for event in stretch.events:
             switched = switch(filter, posterior, event.index, event.on)
@@ -102,8 +102,10 @@ def _steps(filter: Filter, posterior: Posterior, stamp: int) -> list[Step]:
 def _gripped(filter: Filter, posterior: Posterior, index: int) -> Step:
     """How an effect took hold, as a step of no duration and without noise."""
     grip: Grip = take_hold(filter, posterior, index)
-    G = np.zeros_like(grip.F)
-    return Step(posterior.stamp, posterior.holds, grip.state, grip.factor, grip.F, G, grip.after, grip.factor_after)
+    carried, noise = grip.F @ grip.factor, np.zeros_like(grip.F)
+    return Step(
+        posterior.stamp, posterior.holds, grip.state, grip.factor, carried, noise, grip.after, grip.factor_after
+    )
 
 
 def _back(
@@ -112,12 +114,10 @@ def _back(
     """The smoothed state and factor at a step's beginning from those at its end, and what held there."""
     scale = deviations(step.predicted_factor)
     inverse = np.linalg.pinv(step.predicted_factor / scale[:, None], rcond=INVERTIBLE) / scale
-    gain = step.factor @ (step.F @ step.factor).T @ inverse.T @ inverse
-    n = len(gain)
-    W = np.concatenate([(np.eye(n) - gain @ step.F) @ step.factor, gain @ step.G, gain @ factor], axis=1)
-    triangularise(W)
+    gain = step.factor @ step.carried.T @ inverse.T @ inverse
+    W = np.concatenate([step.factor - gain @ step.carried, gain @ step.noise, gain @ factor], axis=1)
     smoothed = filter.process.displace(step.state, gain @ filter.process.difference(step.predicted, state))
-    out = np.ascontiguousarray(W[:, :n])
+    out = predicted_factor(W)
     filter.simulator.switches.holds = step.holds
     filter.simulator.time = (step.stamp - begun) / NANOSECONDS
     filter.constrain(smoothed, out)

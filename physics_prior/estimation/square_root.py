@@ -45,8 +45,8 @@ def triangularise(W: Array) -> None:
 
 
 @kernel
-def predict_factor(F: Array, S: Array, G: Array, W: Array) -> None:
-    """Replace S (n, n) by a lower factor of F S S^T F^T + G G^T. G (n, g); W (n, n + g) is scratch."""
+def carry_factor(F: Array, S: Array, G: Array, W: Array) -> None:
+    """Fill W (n, n + g) with [F S  G], whose W W^T is the predicted covariance F S S^T F^T + G G^T. S (n, n); G (n, g)."""
     n, g = S.shape[0], G.shape[1]
     for i in range(n):
         for j in range(n):
@@ -58,10 +58,12 @@ def predict_factor(F: Array, S: Array, G: Array, W: Array) -> None:
                     W[i, j] += f * S[k, j]
         for j in range(g):
             W[i, n + j] = G[i, j]
+
+
+def predicted_factor(W: np.ndarray) -> np.ndarray:
+    """The lower factor (n, n) of W W^T; W (n, N >= n) is scratch afterwards."""
     triangularise(W)
-    for i in range(n):
-        for j in range(n):
-            S[i, j] = W[i, j]
+    return np.ascontiguousarray(W[:, : len(W)])
 
 
 @kernel

@@ -180,7 +180,33 @@ def urgency(memory: Array, q: Array, v: Array, h: float) -> tuple[bool, float]:
 def impact(memory: Array, q: Array, v: Array) -> int:
     """Change v (nv,) in place by the impact of all that touch at q (nq,); return as ``resolve`` does."""
     prepare(memory, q)
-    return resolve(memory, q, v, 0.0, True)
+    count = resolve(memory, q, v, 0.0, True)
+    if stray(memory, v):
+        resolve(memory, q, v, 0.0, False)
+    return count
+
+
+@kernel
+def stray(memory: Array, v: Array) -> bool:
+    """Add to v (nv,) what the impacts that ``resolve`` left do beside their law; return whether they do anything."""
+    links, work, _, _, _, _, spare, _ = sections(memory)
+    candidates, contacts, _, YZ, _, vectors, _ = contact_sections(memory)
+    count, m = remembered(memory)
+    impulses, beside, strays = vectors[4], vectors[9], False
+    for r in range(m):
+        beside[r] = 0.0
+    for i in range(count):
+        contact = contacts[i]
+        candidate = candidates[contact.candidate]
+        for k in range(3 if candidate.friction > 0.0 else 1):
+            share = candidate.astray[k]
+            beside[contact.first + k] = share * impulses[contact.first]
+            strays = strays or share != 0.0
+    if strays:
+        respond_to(links, work, YZ[1], beside, m, spare[0], spare[1])
+        for k in range(v.shape[0]):
+            v[k] += spare[1, k]
+    return strays
 
 
 @kernel

@@ -36,6 +36,12 @@ CANDIDATE = np.dtype(
         ("restitution", "f8"),
         ("friction_deviation", "f8"),
         ("restitution_deviation", "f8"),
+        ("impulse_deviation", "f8"),
+        (
+            "astray",
+            "f8",
+            3,
+        ),  # what an impact does beside its law, shares of its normal impulse: along it and two tangents
         ("quiet", "f8"),  # speed below which nothing bounces
         ("gap", "f8"),  # least distance when last looked at, m or rad
         ("before", "f8"),  # ... at the beginning of the step
@@ -88,6 +94,7 @@ def candidate_records(tree: Tree, ranges: Sequence[JointRange], pairs: Sequence[
         record["restitution"], record["quiet"] = pair.restitution, pair.quiet
         record["friction_deviation"] = pair.friction_deviation
         record["restitution_deviation"] = pair.restitution_deviation
+        record["impulse_deviation"] = pair.impulse_deviation
     for record, (each, sign, bound) in zip(records[len(pairs) :], ends, strict=True):
         own = tree.link(each.joint)
         record["is_limit"], record["sign"], record["bound"] = 1, sign, bound

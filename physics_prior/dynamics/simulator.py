@@ -188,7 +188,7 @@ class Simulator:
 
     def constrain(self, q: np.ndarray, v: np.ndarray, factor: np.ndarray) -> None:
         """Put q and v, and the columns of a factor (2 nv, k) of their errors, onto the constraints, in place."""
-        if self._touching:
+        if len(self.candidates):
             impulse.push_out(self.memory.array, q)
         if self.rows:
             self.project(q, v)

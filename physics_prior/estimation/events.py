@@ -41,9 +41,10 @@ def carry(
         out[nv:] = v_end - v
         return out
 
-    pairs: list[tuple[np.ndarray, np.ndarray]] = []
-    for column in factor.T:
-        pairs.append((end(WIDTH * column, still), end(-WIDTH * column, still)) if column.any() else (here, here))
+    pairs = [
+        (end(WIDTH * column, still), end(-WIDTH * column, still)) if column.any() else (here, here)
+        for column in factor.T
+    ]
     for k in np.flatnonzero(force):
         tau = np.zeros(nv)
         tau[k] = WIDTH * force[k] / math.sqrt(h)

@@ -175,7 +175,9 @@ class Filter:
     @property
     def constrained(self) -> bool:
         """Whether there are constraints that the process knows."""
-        return (self.simulator.rows > 0 or len(self.simulator.candidates) > 0) and self.process.n == 2 * self.simulator.nv
+        return (
+            self.simulator.rows > 0 or len(self.simulator.candidates) > 0
+        ) and self.process.n == 2 * self.simulator.nv
 
     def constrain(self, state: State, factor: np.ndarray) -> None:
         """Put state and covariance onto what the simulator holds; what holds its part wherever it is moves with it."""

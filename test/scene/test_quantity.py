@@ -105,7 +105,7 @@ def test_every_number_of_the_built_in_effects_states_its_unit():
         "joint_limit": {"restitution", "restitution_deviation"},
         "contact": {
             *("orientation", "to_orientation", "friction", "restitution"),
-            *("friction_deviation", "restitution_deviation"),
+            *("friction_deviation", "restitution_deviation", "impulse_deviation"),
         },
     }
     for kind, effect in REGISTRY.items():

@@ -30,18 +30,6 @@ initial:
 step: {integrator: rk4, size: 5 ms}
 simulation: {rate: 50 Hz}
 """
-LIMIT = """
-description: A rod that swings against a stop and bounces off.
-model:
-  parts:
-    rod: {mass: 1, center_of_mass: [0, 0, -0.5], inertia: {rod: 1}, joint: {kind: revolute, axis: y, name: pivot}}
-effects: [gravity, joint_limit: {name: stop, lower: {pivot: -0.2}, restitution: 0.7}]
-measurements: [pose: {topic: /rod/pose, part: rod, position_noise: 1 mm, orientation_noise: 0.5 deg}]
-noise: {force: 1e-2}
-initial: {positions: {pivot: 60 deg}}
-step: {integrator: rk4, size: 5 ms}
-simulation: {rate: 50 Hz}
-"""
 
 
 def runs_of(scene, count, duration):
@@ -64,11 +52,10 @@ def normalised(process, posterior, moment):
 
 @pytest.mark.parametrize(
     ("text", "runs", "duration"),
-    [  # mean NEES in its band; mean NIS a dimension in its band, as measured
-        (BALL, 40, 1.2),
-        (LIMIT, 100, 1.6),
+    [  # NEES a freedom, NIS a dimension, as measured in their bands; NEES of the smoothed state
+        (BALL, 40, 1.2),  # 0.997 in [0.877, 1.130]; 0.982 in [0.975, 1.025]; smoothed 0.932
     ],
-    ids=["ball", "limit"],
+    ids=["ball"],
 )
 def test_errors_are_as_large_as_said_across_impacts(scene_file, text, runs, duration):
     scene = scene_file(text)

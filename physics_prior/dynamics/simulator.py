@@ -188,8 +188,6 @@ class Simulator:
 
     def constrain(self, q: np.ndarray, v: np.ndarray, factor: np.ndarray) -> None:
         """Put q and v, and the columns of a factor (2 nv, k) of their errors, onto the constraints, in place."""
-        if len(self.candidates):
-            impulse.push_out(self.memory.array, q)
         if self.rows:
             self.project(q, v)
             scratch = np.empty(correction_size(self.rows, self.nv, factor.shape[1]))

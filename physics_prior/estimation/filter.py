@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
+from physics_prior.dynamics.contact.impulse import push_out
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.dynamics.switches import Hold
 from physics_prior.errors import MeasurementError, SimulationError
@@ -180,8 +181,13 @@ class Filter:
         ) and self.process.n == 2 * self.simulator.nv
 
     def constrain(self, state: State, factor: np.ndarray) -> None:
-        """Put state and covariance onto what the simulator holds; what holds its part wherever it is moves with it."""
+        """Put state and covariance onto what the simulator holds; what holds its part wherever it is moves with it.
+
+        What overlaps is pushed apart; what approaches it is for the next step to stop.
+        """
         if self.constrained:
+            if len(self.simulator.candidates):
+                push_out(self.simulator.memory.array, state.q)
             switches = self.simulator.switches
             switches.holds = switches.recaught(state.q)
             self.simulator.constrain(state.q, state.v, factor)

@@ -32,7 +32,6 @@ from physics_prior.dynamics.kinematics import pose, weigh
 from physics_prior.dynamics.types import Array, Record, Records, Vector
 
 REGULARISATION = 1e-10  # of the mean diagonal: small steps are not safer near a singular configuration (design eq. 11)
-UNEVEN = 1e4  # times its own diagonal at most: one light link must not make all other rows look redundant
 DEPENDENT = 1e3  # a pivot within this factor of the regularisation belongs to a row that adds nothing
 REFINEMENTS = 3
 EXACT = 1e-15  # of the right side: refinement stops there
@@ -175,13 +174,6 @@ def width(rows: Array) -> int:
     return int(rows.shape[1] // 2 - row_count(rows))
 
 
-@inline_kernel
-def regularisation(S: Array, r: int, mean: float) -> float:
-    """What is added to the diagonal of row r of A M^-1 A^T, mean being the mean of the diagonal."""
-    own = S[r, r]
-    return REGULARISATION * (min(mean, UNEVEN * own) if own > 0.0 else mean)
-
-
 @kernel
 def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: Array) -> None:
     """Fill Y, Z, A M^-1 A^T and its regularised Cholesky factor, and the last two of known. Needs factors and ``place``.
@@ -212,22 +204,22 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: 
             rows[r, 2 * w + s] = total
             rows[s, 2 * w + r] = total
         trace += rows[r, 2 * w + r]
-    mean = trace / active if trace > 0.0 else 1.0
+    epsilon = REGULARISATION * trace / active if trace > 0.0 else 1.0
     rank, least = 0, math.inf
     S, L = rows[:, 2 * w : 2 * w + m], rows[:, 2 * w + m : 2 * w + 2 * m]
     for r in range(m):
         for s in range(r, m):
             L[r, s] = S[r, s]
-        L[r, r] += regularisation(S, r, mean)
+        L[r, r] += epsilon
     for p in range(pairs.shape[0]):
         pair = pairs[p]
         for r in range(pair.first, pair.first + pair.rows):
-            epsilon, pivot = regularisation(S, r, mean), L[r, r]
+            pivot = L[r, r]
             if pivot > DEPENDENT * epsilon:
                 rank += 1
             pivot = max(pivot, 1e-3 * epsilon)
             if pair.active:
-                least = min(least, pivot / epsilon)
+                least = min(least, pivot)
             inverse = 1.0 / pivot
             L[r, r] = inverse
             for s in range(r + 1, m):
@@ -238,7 +230,7 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: 
             for s in range(r + 1, m):
                 L[r, s] = L[s, r]
     known[-2] = rank
-    known[-1] = max(POSITION_TOLERANCE * math.sqrt(least * REGULARISATION), ROUNDING)
+    known[-1] = max(POSITION_TOLERANCE * math.sqrt(least * REGULARISATION / epsilon), ROUNDING)
 
 
 @kernel

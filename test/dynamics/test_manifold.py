@@ -71,7 +71,7 @@ def test_rate_of_local_coordinates(case):
     rng, tree, links, q, v = case
     for size, bound in ((1e-1, 1e-5), (1e-2, 1e-9)):
         theta, rate = size * rng.uniform(-1.0, 1.0, size=tree.nv), np.zeros(tree.nv)
-        manifold.rate(links, theta, v, rate)
+        manifold.rate(links, theta, v, False, rate)
         ahead = tree.integrate(q, theta + STEP * rate)
         behind = tree.integrate(q, theta - STEP * rate)
         motion = tree.difference(behind, ahead) / (2.0 * STEP)
@@ -82,10 +82,10 @@ def test_derivative_of_the_rate(case):
     rng, tree, links, _, v = case
     theta, direction = 0.1 * rng.normal(size=tree.nv), rng.normal(size=(2, tree.nv))
     out = np.zeros((tree.nv, 1))
-    manifold.rate_derivative(links, theta, v, direction[0][:, None].copy(), direction[1][:, None].copy(), out)
+    manifold.rate_derivative(links, theta, v, direction[0][:, None].copy(), direction[1][:, None].copy(), False, out)
     ends = np.zeros((2, tree.nv))
     for end, sign in zip(ends, (1.0, -1.0), strict=True):
-        manifold.rate(links, theta + sign * STEP * direction[0], v + sign * STEP * direction[1], end)
+        manifold.rate(links, theta + sign * STEP * direction[0], v + sign * STEP * direction[1], False, end)
     assert off(out[:, 0], (ends[0] - ends[1]) / (2.0 * STEP)) < 1e-8  # measured 4e-10
 
 

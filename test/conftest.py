@@ -1,9 +1,11 @@
 """What every test shares: a ROS graph of its own, reproducible properties, the data beside the repository."""
 
+import functools
 import os
 import secrets
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import settings
 
@@ -35,3 +37,31 @@ def shared() -> Path:
     if not folder.is_dir():
         pytest.skip("missing ../shared: recordings and reference data beside the repository")
     return folder
+
+
+def _looked_at(method):
+    """The same method of a filter, whose posterior's covariance is looked at."""
+
+    @functools.wraps(method)
+    def look(*args, **kwargs):
+        posterior = method(*args, **kwargs)
+        S = posterior.factor
+        P = S @ S.T
+        assert np.isfinite(P).all()
+        assert np.array_equal(P, P.T)
+        values = np.linalg.eigvalsh(P)
+        assert values[0] >= -1e-12 * values[-1]
+        return posterior
+
+    return look
+
+
+@pytest.fixture(scope="session", autouse=True)
+def covariances_are_looked_at():
+    """At every step of every filter of every test: finite, symmetric, positive semi-definite."""
+    from physics_prior.estimation.filter import Filter  # after ROS is set up
+
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("predict", "update"):
+            patch.setattr(Filter, name, _looked_at(getattr(Filter, name)))
+        yield

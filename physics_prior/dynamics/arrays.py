@@ -3,6 +3,8 @@
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.types import Array
 
+NOTHING = 1e-24  # square of a lever, m, that is rounding
+
 
 @kernel
 def clear(out: Array) -> None:
@@ -55,3 +57,14 @@ def subtract_transposed_product(a: Array, b: Array, out: Array) -> None:
             p, x = a[j, i], b[j]
             for c in range(row.shape[0]):
                 row[c] -= p * x[c]
+
+
+@kernel
+def drop_rounding(row: Array, width: int) -> None:
+    """Clear a row whose first numbers, the joints' levers, m, under a unit force, are rounding: a rod at its dead centre."""
+    total = 0.0
+    for k in range(width):
+        total += row[k] * row[k]
+    if total < NOTHING:
+        for k in range(row.shape[0]):
+            row[k] = 0.0

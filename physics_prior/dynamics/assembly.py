@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from physics_prior.effects.holding import Holding
+from physics_prior.errors import SimulationError
 
 if TYPE_CHECKING:
     from physics_prior.dynamics.simulator import Simulator
@@ -23,6 +24,9 @@ def assemble(simulator: "Simulator", q: np.ndarray, v: np.ndarray) -> float:
 
     By projection; where that fails, by Newton's method with a line search before it. What is held turned by half a turn,
     where the rows of hinges and welds vanish too, is turned back first.
+
+    Raises:
+        SimulationError: a joint that moves no inertia in a posture on the way.
     """
     start, speed = q.copy(), v.copy()
     left = simulator.project(q, v)
@@ -61,8 +65,8 @@ def _descend(simulator: "Simulator", q: np.ndarray) -> float:
         if size < NEAR:
             break
         A, _ = simulator.tangent_rows(q, still)
-        M = simulator.mass_matrix(q)
-        step = -np.linalg.solve(M, A.T) @ _pseudo_solve(A @ np.linalg.solve(M, A.T), error)
+        responses = _responses(simulator, q, A)
+        step = -responses @ _pseudo_solve(A @ responses, error)
         tried, length = _search(simulator, q, step, size)
         if length == 0.0:
             break
@@ -95,10 +99,22 @@ def _turn_back(simulator: "Simulator", q: np.ndarray, index: int) -> None:
         if angle < NEAR:
             return
         J = simulator.jacobian(effect.part, origin)[:3] - simulator.jacobian(effect.to, origin)[:3]
-        M = simulator.mass_matrix(q)
-        responses = np.linalg.solve(M, J.T)
+        responses = _responses(simulator, q, J)
         step = responses @ _pseudo_solve(J @ responses, turn * min(1.0, LARGEST_TURN / angle))
         q[:] = simulator.displaced(q, step)
+
+
+def _responses(simulator: "Simulator", q: np.ndarray, A: np.ndarray) -> np.ndarray:
+    """M^-1 A^T (nv, rows) at q; SimulationError where a joint carries no inertia in this posture."""
+    M = simulator.mass_matrix(q)
+    try:
+        responses = np.linalg.solve(M, A.T)
+    except np.linalg.LinAlgError:
+        freedom = simulator.tree.freedom_names[int(np.argmax(np.abs(np.linalg.eigh(M)[1][:, 0])))]
+        raise SimulationError(
+            f"what holds cannot be put together: '{freedom}' moves no inertia in this posture (a straight chain, say)"
+        ) from None
+    return np.asarray(responses)
 
 
 def _pseudo_solve(S: np.ndarray, right: np.ndarray) -> np.ndarray:

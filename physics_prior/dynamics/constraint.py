@@ -25,7 +25,7 @@ from physics_prior.dynamics.algebra import (
     scale,
     times,
 )
-from physics_prior.dynamics.arrays import accumulate, clear, copy
+from physics_prior.dynamics.arrays import accumulate, clear, copy, drop_rounding
 from physics_prior.dynamics.articulated_body import factorize, pull, push
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import pose, weigh
@@ -197,6 +197,7 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: 
     trace = 0.0
     for r in range(m):
         one = rows[r, :w]
+        drop_rounding(rows[r, : 2 * w], w)
         for s in range(r + 1):
             other, total = rows[s, w : 2 * w], 0.0
             for k in range(w):

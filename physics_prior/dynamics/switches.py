@@ -17,6 +17,8 @@ from physics_prior.errors import ModelError, SimulationError
 if TYPE_CHECKING:
     from physics_prior.dynamics.simulator import Simulator
 
+GAIN = 1e-6  # of the kinetic energy: what rounding may add as something takes hold
+UNLIKE = "the masses or inertias that it joins are too unlike for its impulse to be told from rounding"
 MOVED = 1e-12  # m or rad: below it, taking hold has not moved the body
 
 
@@ -180,8 +182,11 @@ class Switches:
         """
         if not self.effects:
             return {}
-        simulator, before, energy = self._simulator, q.copy(), _kinetic_energy(self._simulator, q, v)
+        simulator, before, speed = self._simulator, q.copy(), v.copy()
+        energy = _kinetic_energy(simulator, q, v)
         left = assemble(simulator, q, v)
+        if not (np.isfinite(q).all() and np.isfinite(v).all()):
+            raise SimulationError(f"{self._worst()} cannot take hold: {UNLIKE}")
         if not left <= ASSEMBLED:
             raise SimulationError(
                 f"{self._worst()} cannot take hold: {left:.3g} m stay between the points that it joins"
@@ -193,8 +198,12 @@ class Switches:
         impulses = self._impulses()
         moved = float(np.max(np.abs(simulator.tree.difference(before, q)), initial=0.0))
         after = _kinetic_energy(simulator, q, v)
-        if moved > MOVED and after > energy and not np.any(simulator.memory.pairs["motion"]):
-            v *= np.sqrt(energy / after)
+        if not np.any(simulator.memory.pairs["motion"]):
+            # the impulse is a projection in the mass metric, so it takes energy
+            if after > (1.0 + GAIN) * _kinetic_energy(simulator, q, speed):
+                raise SimulationError(f"{self._worst()} cannot take hold: {UNLIKE}")
+            if moved > MOVED and after > energy:
+                v *= np.sqrt(energy / after)
         return impulses
 
     def _here(self, index: int) -> bool:

@@ -31,7 +31,7 @@ class Posterior:
     Attributes:
         stamp: ns.
         state: the best state.
-        factor: (n, n) lower factor S of its covariance S S^T.
+        factor: (n, n) factor S of its covariance S S^T; lower, but for what constraints do to it.
         accepted: stamp of the last measurement that was believed, ns.
         refused: how many the gate has refused since.
         used: whether the last one was believed; None where it said nothing or did not fit.

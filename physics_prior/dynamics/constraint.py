@@ -178,9 +178,7 @@ def width(rows: Array) -> int:
 def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: Array) -> None:
     """Fill Y, Z, A M^-1 A^T and its regularised Cholesky factor, and the last two of known. Needs factors and ``place``.
 
-    These are the rows' rank and the position error, m, that projection may leave: so little that no motion strays further
-    than POSITION_TOLERANCE, however nearly singular the rows are (a mechanism that folds).
-    The factor is L D L^T with unit L, here also above the diagonal, in which stands D inverted.
+    These are the rows' rank and the position error, m, that projection may leave. The factor: L D L^T, L both ways, D inverted.
     """
     m, w, active = row_count(rows), width(rows), 0
     for p in range(pairs.shape[0]):

@@ -62,7 +62,7 @@ class PhysicsPriorNode(LifecycleNode):
         self._publishers_by_topic: dict[str, Any] = {}
         self._inputs: list[Input] = []
         self._rate_timers: list[Any] = []
-        self._services: list[Any] = []
+        self._offered: list[Any] = []  # services; `_services` is rclpy's own
         self._lost_before = 0
         self._forget()
         self.add_on_set_parameters_callback(self._judge_parameters)
@@ -141,9 +141,9 @@ class PhysicsPriorNode(LifecycleNode):
             self._publishers_by_topic[topic] = self.create_lifecycle_publisher(
                 ros_class(message_type.ros_type), topic, QoSProfile(depth=depth, durability=durability)
             )
-        self._services = [self.create_service(Trigger, "~/reset", self._reset_asked)]
+        self._offered = [self.create_service(Trigger, "~/reset", self._reset_asked)]
         for effect, name in switch_services(scene).items():
-            self._services.append(self.create_service(SetBool, name, partial(self._switch_asked, effect)))
+            self._offered.append(self.create_service(SetBool, name, partial(self._switch_asked, effect)))
 
     def _stop(self) -> None:
         for each in self._inputs:
@@ -158,9 +158,9 @@ class PhysicsPriorNode(LifecycleNode):
         self._stop()
         for publisher in self._publishers_by_topic.values():
             self.destroy_lifecycle_publisher(publisher)
-        for service in self._services:
+        for service in self._offered:
             self.destroy_service(service)
-        self._publishers_by_topic, self._services = {}, []
+        self._publishers_by_topic, self._offered = {}, []
         self._estimator, self._output = None, None
 
     # Parameters and time --------------------------------------------------------------------------------------------

@@ -236,7 +236,8 @@ def _require_moments_of_a_body(moments: NDArray[np.floating]) -> None:
     """Refuse principal moments, ascending, that no distribution of positive mass has."""
     smallest, middle, largest = moments
     shown = f"inertia with principal moments {smallest:g}, {middle:g}, {largest:g} kg m^2"
-    tolerance = INERTIA_TOLERANCE * max(abs(smallest), abs(largest))
+    # numbers below the smallest normal one keep no relative precision
+    tolerance = INERTIA_TOLERANCE * max(abs(smallest), abs(largest)) + float(np.finfo(float).tiny)
     if smallest < -tolerance:
         raise ModelError(f"{shown} is not positive semi-definite: no moment may be negative")
     if largest - middle - smallest > tolerance:

@@ -116,6 +116,11 @@ def test_transformed_keeps_principal_moments_and_moves_the_centre(body, rotation
     np.testing.assert_allclose(back.center_of_mass, body.center_of_mass, atol=1e-13)  # 2e-15
 
 
+def test_moments_below_the_normal_numbers_are_none():
+    # found by drawing: 0, 9.91677e-318, 9.91679e-318 are equal but for their few bits
+    MassProperties(1.0, np.zeros(3), np.diag([0.0, 9.91677e-318, 9.91679e-318]))
+
+
 @given(bodies)
 def test_principal_axes_diagonalise_the_inertia(body):
     moments, q = body.principal_axes()

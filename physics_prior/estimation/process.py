@@ -6,6 +6,7 @@ measured against.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -60,12 +61,13 @@ def steps(seconds: float, size: float) -> tuple[int, float]:
     return count, seconds / count
 
 
-class _OnManifold:
+class _OnManifold(ABC):
     def __init__(self, scene: Scene, simulator: Simulator, n: int) -> None:
         self.scene, self.simulator, self.n = scene, simulator, n
 
+    @abstractmethod
     def advance(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
-        raise NotImplementedError
+        """As ``Process.advance``."""
 
     def carry(self, state: State, factor: np.ndarray, h: float) -> np.ndarray:
         F, G = self.advance(state, h)

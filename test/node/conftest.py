@@ -25,7 +25,7 @@ from physics_prior.scene import load_scene
 
 SCENE = "uw_double_pendulum"
 TOPICS = ("/link1/pose", "/link2/pose")
-DEADLINE = 120.0  # s, for what takes a hundredth of one, beside another process that compiles
+DEADLINE = 30.0  # s, for what takes a hundredth of one
 PATIENCE = 1.0  # s, until a service is asked again
 QUIET = {"publish_rate": 0.0, "marker_rate": 0.0, "diagnostics_rate": 0.0}
 DEPTH = 5000  # of queues that lose nothing

@@ -8,9 +8,10 @@ from physics_prior import rotations
 from physics_prior.dynamics import anchor_motion, constraint, kinematics, manifold, newton_euler, projection
 from physics_prior.dynamics.compose import GRAVITY, pack_parameters, step_module
 from physics_prior.dynamics.contact import impulse
-from physics_prior.dynamics.contact.memory import candidates_in, contact_memory
+from physics_prior.dynamics.contact.memory import candidates_in, contact_memory, residual_in
 from physics_prior.dynamics.contact.reactions import candidates_by_name, reaction
 from physics_prior.dynamics.contact.records import candidate_records
+from physics_prior.dynamics.inertia_check import check_inertia
 from physics_prior.dynamics.integrators import DEFAULT, INTEGRATORS, TOLERATED, IntegratorName
 from physics_prior.dynamics.memory import SPARE, TIME, TOLERANCE, Memory, correction_size, tangent_size
 from physics_prior.dynamics.records import link_records, motion_tables, moved_freedoms, pair_records
@@ -19,9 +20,6 @@ from physics_prior.dynamics.wrench import Wrench
 from physics_prior.effects.effect import Effect, PointPair
 from physics_prior.errors import ModelError, SimulationError
 from physics_prior.model import Tree
-
-SINGULAR = 1e-13  # least eigenvalue of the scaled mass matrix: below, a joint moves nothing
-ROUNDING = 1e-15  # of the largest moment about a joint: below, a moment is zero
 
 
 class Simulator:
@@ -107,7 +105,7 @@ class Simulator:
         self._stores = any(effect.compiled is not None and effect.compiled.energy is not None for effect in effects)
         self._posed = np.zeros(self.nq)
         self.switches = Switches(self, [(first, last) for _, first, last in self._labels])
-        self._check_inertia()
+        check_inertia(self)
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray | None = None) -> np.ndarray:
         """(nv,) vdot at q and v under the effects and generalized forces tau (nv,); fills ``rank``.
@@ -122,7 +120,7 @@ class Simulator:
     def acceleration_derivatives(
         self, q: np.ndarray, v: np.ndarray, tau: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives (nv, nv) of ``acceleration`` by the tangent of q and by v, at constant tau."""
+        """Derivatives (nv, nv) of ``acceleration`` by the tangent of q and by v, at constant tau; not of what touches."""
         extra, nv = self._still if tau is None else tau, self.nv
         self.rank = self.step.differentiate_acceleration(self.memory.array, self.tangent_array(), q, v, extra)
         by_state = self.tangent_array()[: 2 * nv * nv].reshape(nv, 2 * nv)
@@ -324,6 +322,11 @@ class Simulator:
         self.memory.array[TIME] = value
 
     @property
+    def contact_residual(self) -> float:
+        """How far contact was from solved when last asked for, relative: above 1e-6 it jams, and is only nearly told."""
+        return residual_in(self.memory.contact_part)
+
+    @property
     def effort(self) -> np.ndarray:
         """(nv,) generalized forces of the effects at the last ``acceleration`` or ``wrenches``; no wrenches on parts."""
         return np.array(self.memory.spare[2])
@@ -368,32 +371,3 @@ class Simulator:
                 f"the acceleration of '{self.tree.freedom_names[int(np.argmin(finite))]}' is not finite: the state is not,"
                 " or a joint carries no inertia in this posture (a straight chain of thin rods)"
             )
-
-    def _check_inertia(self) -> None:
-        """Refuse joints that move no inertia, in any of a few postures (a point mass on a joint's axis, say)."""
-        rng = np.random.default_rng(0)
-        worst = None
-        for _ in range(3):
-            q = self.tree.integrate(self.tree.neutral(), rng.normal(size=self.nv))
-            M = self.mass_matrix(q)
-            inertia = np.diag(M)
-            lacking = [k for link in self.tree.links for k in _idle(inertia, link.v)]
-            if lacking:
-                worst = lacking[0]
-            else:
-                scale = np.sqrt(inertia)
-                values, vectors = np.linalg.eigh(M / np.outer(scale, scale))
-                if values[0] > SINGULAR:
-                    return
-                worst = int(np.argmax(np.abs(vectors[:, 0])))
-        if worst is not None:
-            raise ModelError(
-                f"'{self.tree.freedom_names[worst]}' moves no inertia: give what it carries a mass off its axis or an inertia"
-            )
-
-
-def _idle(inertia: np.ndarray, v: slice) -> list[int]:
-    """The degrees of freedom v of a joint that move nothing but rounding, against the others that turn about it."""
-    turning = range(v.start, v.stop)[-3:]
-    largest = max(inertia[k] for k in turning)
-    return [k for k in turning if not inertia[k] > ROUNDING * largest]

@@ -28,6 +28,7 @@ def diagnostics(
     values["active effects"] = ", ".join(active) or "none"
     if simulator.touching:
         values["touching"] = ", ".join(touching) or "nothing"
+        values["contact residual"] = f"{simulator.contact_residual:.3g}"
     if estimate is not None:
         nis, dimension = estimate.nis
         values |= {

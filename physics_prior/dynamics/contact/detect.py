@@ -17,8 +17,7 @@ from physics_prior.dynamics.algebra import (
     times,
 )
 from physics_prior.dynamics.constraint import point_velocity
-from physics_prior.dynamics.contact.finders import find
-from physics_prior.dynamics.contact.geometry.manifold import SLOTS, exchange
+from physics_prior.dynamics.contact.geometry.pairs import touch
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.types import Array, Matrix, Record, Records, Vector
 
@@ -37,26 +36,11 @@ def surface_pose(work: Records, link: int, position: Vector, R: Matrix) -> tuple
 
 @kernel
 def find_points(work: Records, candidate: Record, reach: float, points: Array) -> int:
-    """Fill points (SLOTS, ROW) with where two surfaces are within reach of each other; return how many.
-
-    A row is a point on a (3), on b (3), the unit normal from a to b (3) and the gap, m, world axes. The nearest is always
-    there. The rows behind hold what the geometry is asked.
-    """
+    """Fill points with where two surfaces are within reach, m, of each other, as ``touch`` says; return how many."""
     a, R_a = surface_pose(work, candidate.link_a, get3(candidate.position_a), get9(candidate.rotation_a))
     b, R_b = surface_pose(work, candidate.link_b, get3(candidate.position_b), get9(candidate.rotation_b))
-    asked = points[SLOTS:].reshape(-1)
-    one, other = (15, 0) if candidate.swapped else (0, 15)
-    put3(asked[one : one + 3], get3(candidate.size_a))
-    put3(asked[one + 3 : one + 6], a)
-    put9(asked[one + 6 : one + 15], R_a)
-    put3(asked[other : other + 3], get3(candidate.size_b))
-    put3(asked[other + 3 : other + 6], b)
-    put9(asked[other + 6 : other + 15], R_b)
-    asked[30] = reach
-    count = int(find(candidate.finder, asked, points))
-    if candidate.swapped:
-        exchange(points, count)
-    return count
+    size_a, size_b = get3(candidate.size_a), get3(candidate.size_b)
+    return touch(candidate.finder, candidate.exchanged != 0, size_a, a, R_a, size_b, b, R_b, reach, points)
 
 
 @inline_kernel

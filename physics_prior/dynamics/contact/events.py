@@ -16,11 +16,10 @@ from physics_prior.dynamics.kinematics import pose
 from physics_prior.dynamics.manifold import difference, displace
 from physics_prior.dynamics.memory import TIME, sections
 from physics_prior.dynamics.motion import differentiate, evaluate, settle, spread_noise
-from physics_prior.dynamics.types import Array, Records
+from physics_prior.dynamics.types import Array
 
 SEARCHES = 60  # for a time of impact
 DIFFERENCE = 1e-6  # rad, m or their rates: half the width of central differences across events
-PARAMETER_SHARE = 1e-4  # of a deviation: the same for friction and restitution
 EXACT = 1e-13  # m or rad: gap at the time of impact
 
 
@@ -133,8 +132,7 @@ def linearise_events(
     """Do as ``linearise_smooth`` does, through contacts and impacts.
 
     Across events F is central differences of the step, whose time of impact moves with the state: so it is the saltation
-    matrix (Aizerman and Gantmacher 1958) times the smooth motion about it, and no error is left into what holds. G adds what
-    the uncertain friction and restitution do in the step.
+    matrix (Aizerman and Gantmacher 1958) times the smooth motion about it, and no error is left into what holds.
     """
     links, work, _, _, _, _, spare, _ = sections(memory)
     candidates, _, points, _, _, _, states = contact_sections(memory)
@@ -184,17 +182,6 @@ def linearise_events(
                 total += F[i, nv + j] * states[10, j]
             G[i, k] = total
             G[i, nv + k] = 0.0
-    for parameter in range(2):
-        column = nv + (parameter if nv > 1 else 0)
-        for side in range(2):
-            share = PARAMETER_SHARE if side == 0 else -PARAMETER_SHARE
-            _vary(candidates, parameter, share)
-            copy(q_first, states[6])
-            copy(v_first, states[7, :nv])
-            memory[TIME] = time
-            event_step(memory, states[6], states[7, :nv], extra, h)
-            _vary(candidates, parameter, -share)
-            _difference_column(memory, nv, 0.5 / share, G, column, False)
     memory[TIME] = end
     return rank
 
@@ -211,14 +198,3 @@ def _difference_column(memory: Array, nv: int, weight: float, out: Array, k: int
             out[i, k], out[nv + i, k] = 0.0, 0.0
         out[i, k] += weight * delta[i]
         out[nv + i, k] += weight * (states[7, i] - states[5, i])
-
-
-@kernel
-def _vary(candidates: Records, parameter: int, share: float) -> None:
-    """Change all frictions (0) or restitutions (1) by a share of their deviations."""
-    for i in range(candidates.shape[0]):
-        candidate = candidates[i]
-        if parameter == 0:
-            candidate.friction += share * candidate.friction_deviation
-        else:
-            candidate.restitution += share * candidate.restitution_deviation

@@ -28,7 +28,6 @@ from physics_prior.dynamics.types import Array, Records, Vector
 
 OUT = 1e-10  # m or rad: penetration that is left
 PASSES = 5  # of pushing out
-UNSOLVED = 1e-6  # residual of the complementarity problem above which ``resolve`` says so
 
 
 @kernel
@@ -44,11 +43,12 @@ def prepare(memory: Array, q: Array) -> None:
 
 
 @kernel
-def resolve(memory: Array, q: Array, v: Array, h: float, bounce: bool) -> int:
-    """Change v (nv,) in place to what contacts admit; return how many points touch or may, negated where not solved well.
+def resolve(memory: Array, q: Array, v: Array, h: float, bounce: bool) -> None:
+    """Change v (nv,) in place to what contacts admit.
 
     h > 0: v is the free velocity at the end of a step of h. h = 0: v meets those that touch, and with ``bounce`` those that
-    approach faster than their quiet speed leave by their restitution. Needs ``prepare``. The impulses stay in the memory.
+    approach faster than their quiet speed leave by their restitution. Needs ``prepare``. The impulses and the
+    residual of the complementarity problem stay in the memory.
     """
     links, work, pairs, rows, _, _, spare, _ = sections(memory)
     candidates, contacts, points, YZ, SG, vectors, _ = contact_sections(memory)
@@ -56,9 +56,9 @@ def resolve(memory: Array, q: Array, v: Array, h: float, bounce: bool) -> int:
     flow(links, work, v)
     count = collect(work, candidates, contacts, points, q, v, links, h)
     m = assemble_contacts(links, work, candidates, contacts, count, rows, YZ, S, vectors) if count > 0 else 0
-    remember(memory, count, m)
+    remember(memory, count, m, 0.0)
     if count == 0:
-        return 0
+        return
     equalities = row_count(rows)
     velocity_error(work, pairs, u)
     for r in range(equalities):
@@ -87,7 +87,7 @@ def resolve(memory: Array, q: Array, v: Array, h: float, bounce: bool) -> int:
     respond_to(links, work, YZ[1], impulses, m, spare[0], spare[1])
     for k in range(v.shape[0]):
         v[k] += spare[1, k]
-    return count if error < UNSOLVED else -count
+    remember(memory, count, m, error)
 
 
 @kernel
@@ -177,13 +177,12 @@ def urgency(memory: Array, q: Array, v: Array, h: float) -> tuple[bool, float]:
 
 
 @kernel
-def impact(memory: Array, q: Array, v: Array) -> int:
-    """Change v (nv,) in place by the impact of all that touch at q (nq,); return as ``resolve`` does."""
+def impact(memory: Array, q: Array, v: Array) -> None:
+    """Change v (nv,) in place by the impact of all that touch at q (nq,)."""
     prepare(memory, q)
-    count = resolve(memory, q, v, 0.0, True)
+    resolve(memory, q, v, 0.0, True)
     if stray(memory, v):
         resolve(memory, q, v, 0.0, False)
-    return count
 
 
 @kernel

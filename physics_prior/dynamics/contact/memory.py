@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numba import carray
 
-from physics_prior.dynamics.contact.geometry.pairs import SLOTS
+from physics_prior.dynamics.contact.geometry.pairs import ASKED, ROW, SLOTS
 from physics_prior.dynamics.contact.records import CANDIDATE, CONTACT
 from physics_prior.dynamics.kernel import inline_kernel
 from physics_prior.dynamics.memory import CONTACT_PART, FLOAT, address
@@ -13,10 +13,8 @@ from physics_prior.dynamics.types import Array
 
 HEAD = 8
 CANDIDATE_SIZE, CONTACT_SIZE = CANDIDATE.itemsize // 8, CONTACT.itemsize // 8
-POINT_SIZE = 10  # numbers of a point that the geometry finds
-ASKED = 4  # rows of points that hold what the geometry is asked
 VECTORS = (
-    10  # of the system: bias, kinds, owners, bounds, impulses, scratch (3), velocities, impulses without restitution
+    10  # of the system: bias, kinds, owners, bounds, impulses, scratch (3), velocities, impulses but for restitution
 )
 STATES = 12  # configurations and velocities that an event step keeps beside the present ones
 
@@ -32,7 +30,7 @@ def contact_memory(candidates: np.ndarray, equalities: int, width: int, nq: int)
     sizes = [
         len(candidates) * CANDIDATE_SIZE,
         contacts * CONTACT_SIZE,
-        (SLOTS + ASKED) * POINT_SIZE,
+        (SLOTS + ASKED) * ROW,
         2 * m * width,
         2 * m * m,
         VECTORS * m,
@@ -55,7 +53,7 @@ def _starts(n: int, c: int, m: int, w: int) -> tuple[int, int, int, int, int, in
     """Where the part's sections begin in it, for n candidates, c contacts, and m rows over w degrees of freedom."""
     contacts = HEAD + n * CANDIDATE_SIZE
     points = contacts + c * CONTACT_SIZE
-    factors = points + (SLOTS + ASKED) * POINT_SIZE
+    factors = points + (SLOTS + ASKED) * ROW
     matrices = factors + 2 * m * w
     vectors = matrices + 2 * m * m
     return HEAD, contacts, points, factors, matrices, vectors, vectors + VECTORS * m
@@ -71,12 +69,17 @@ def contact_sections(memory: Array) -> Any:
     return (
         carray(address(memory, base + a), n, CANDIDATE),
         carray(address(memory, base + b), c, CONTACT),
-        carray(address(memory, base + d), (SLOTS + ASKED, POINT_SIZE), FLOAT),
+        carray(address(memory, base + d), (SLOTS + ASKED, ROW), FLOAT),
         carray(address(memory, base + e), (2, m, w), FLOAT),
         carray(address(memory, base + f), (2, m, m), FLOAT),
         carray(address(memory, base + g), (VECTORS, m), FLOAT),
         carray(address(memory, base + h), (STATES, nq), FLOAT),
     )
+
+
+def residual_in(contact_part: np.ndarray) -> float:
+    """What was left of the last system unsolved, of the largest velocity, in the metric of S."""
+    return float(contact_part[7]) if len(contact_part) else 0.0
 
 
 def solved_system(contact_part: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -91,10 +94,10 @@ def solved_system(contact_part: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.
 
 
 @inline_kernel
-def remember(memory: Array, count: int, rows: int) -> None:
-    """Keep how many contacts there are, and rows of the system with them."""
+def remember(memory: Array, count: int, rows: int, residual: float) -> None:
+    """Keep how many contacts there are, rows of the system with them, and what is left of it unsolved."""
     base = int(memory[CONTACT_PART])
-    memory[base + 5], memory[base + 6] = count, rows
+    memory[base + 5], memory[base + 6], memory[base + 7] = count, rows, residual
 
 
 @inline_kernel

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from physics_prior import rotations
-from physics_prior.dynamics.contact.finders import finder
-from physics_prior.dynamics.contact.geometry.pairs import BOX, CAPSULE, ELLIPSOID, PLANE, SPHERE
+from physics_prior.dynamics.contact.geometry.pairs import BOX, CAPSULE, ELLIPSOID, PLANE, SPHERE, finder
 from physics_prior.effects.touching import JointRange, Surface, TouchingPair
 from physics_prior.model import Tree
 
@@ -22,7 +21,7 @@ CANDIDATE = np.dtype(
         ("sign", "f8"),  # of a limit: +1 at the lower end, -1 at the upper one
         ("bound", "f8"),  # of a limit: that end, rad or m
         ("finder", "i8"),  # address of the geometry of its two kinds of surfaces
-        ("swapped", "i8"),  # whether that takes them in the opposite order
+        ("exchanged", "i8"),  # whether that takes them in the opposite order
         ("size_a", "f8", 3),
         ("size_b", "f8", 3),
         ("position_a", "f8", 3),  # of the surface's centre in its link's frame, m
@@ -37,20 +36,12 @@ CANDIDATE = np.dtype(
         ("friction_deviation", "f8"),
         ("restitution_deviation", "f8"),
         ("impulse_deviation", "f8"),
-        (
-            "astray",
-            "f8",
-            3,
-        ),  # what an impact does beside its law, shares of its normal impulse: along it and two tangents
+        ("astray", "f8", 3),  # what an impact does beside its law: shares of its normal impulse, along it and across
         ("quiet", "f8"),  # speed below which nothing bounces
         ("gap", "f8"),  # least distance when last looked at, m or rad
         ("before", "f8"),  # ... at the beginning of the step
         ("coming", "i8"),  # whether it is about to touch within the step
-        (
-            "force",
-            "f8",
-            3,
-        ),  # ON link b when last asked for, world, N; of a limit its torque or force along the axis in [0]
+        ("force", "f8", 3),  # ON link b when last asked for, world, N; of a limit along its axis, in [0]
         ("moment", "f8", 3),  # about ``point``
         ("point", "f8", 3),  # where the force acts, world, m
     ],
@@ -88,7 +79,7 @@ def candidate_records(tree: Tree, ranges: Sequence[JointRange], pairs: Sequence[
             record[f"link_{side}"] = link
             record[f"size_{side}"], record[f"position_{side}"] = surface.size, position
             record[f"rotation_{side}"] = R.ravel()
-        record["finder"], record["swapped"] = finder(KINDS[pair.a.kind], KINDS[pair.b.kind])
+        record["finder"], record["exchanged"] = finder(KINDS[pair.a.kind], KINDS[pair.b.kind])
         record["radius"] = float(np.linalg.norm(pair.b.size)) + float(np.max(pair.b.size))
         record["velocity"], record["friction"], record["rolling"] = pair.velocity, pair.friction, pair.rolling
         record["restitution"], record["quiet"] = pair.restitution, pair.quiet

@@ -7,7 +7,18 @@ import numpy as np
 import pytest
 
 from physics_prior import rotations
-from physics_prior.dynamics.contact.geometry.pairs import BOX, CAPSULE, ELLIPSOID, PLANE, ROW, SLOTS, SPHERE, touch
+from physics_prior.dynamics.contact.geometry.pairs import (
+    ASKED,
+    BOX,
+    CAPSULE,
+    ELLIPSOID,
+    PLANE,
+    ROW,
+    SLOTS,
+    SPHERE,
+    finder,
+    touch,
+)
 
 
 @dataclass(frozen=True)
@@ -49,9 +60,9 @@ class Shape:
         return {SPHERE: self.size[0], CAPSULE: self.size[0] + self.size[1]}.get(self.kind, np.linalg.norm(self.size))
 
     def arguments(self):
+        size = self.size * [1.0, 0.0, 0.0] if self.kind == SPHERE else self.size
         return (
-            self.kind,
-            tuple(map(float, self.size)),
+            tuple(map(float, size)),
             tuple(map(float, self.center)),
             tuple(map(float, self.R.ravel())),
         )
@@ -63,8 +74,8 @@ def matrix(rotation_vector):
 
 def manifold(a, b, reach=0.0):
     """The rows of the manifold of two shapes, copied."""
-    out = np.full((SLOTS, ROW), np.nan)
-    return out[: touch(*a.arguments(), *b.arguments(), float(reach), out)]
+    out = np.full((SLOTS + ASKED, ROW), np.nan)
+    return out[: touch(*finder(a.kind, b.kind), *a.arguments(), *b.arguments(), float(reach), out)]
 
 
 def nearest(a, b):

@@ -2,21 +2,22 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Literal
 
 from physics_prior.commands.terminal import status
 from physics_prior.dynamics.compose import kinds_of_rows, step_module
 from physics_prior.dynamics.kernel import cache_directory
 from physics_prior.scene import Scene
 
-DURATION, WITH_CONTACT = "~20 s", "~1 min"
+DURATION, WITH_CONTACT = "~15 s", "~40 s"
 
 
 @contextmanager
-def compiling(scene: Scene, kernel: str) -> Iterator[None]:
-    """Say what is going on while the block makes the first use of a scene's step; kernel: the last that it compiles."""
+def compiling(scene: Scene, last: Literal["advance", "linearise"]) -> Iterator[None]:
+    """Say what is going on while the block makes the first use of a scene's step; last: what it compiles last of that."""
     constrained, touching = kinds_of_rows(scene.tree, scene.effects)
-    step = step_module(scene.effects, constrained, scene.step.integrator, touching).__name__
-    cached = any(cache_directory().glob(f"*/{step}.{kernel}-*.nbc"))
+    step = step_module(scene.effects, constrained, scene.step.integrator, touching)
+    cached = any(cache_directory().glob(f"*/{step.__name__}.{getattr(step, last).__name__}-*.nbc"))
     duration = WITH_CONTACT if touching else DURATION
     with status(f"loading {scene.name}" if cached else f"compiling the step of {scene.name}, once: {duration}"):
         yield

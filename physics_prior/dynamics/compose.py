@@ -86,7 +86,7 @@ def step_source(
         texts["motion"] = _replace(texts["motion"], "effects", "\n\n\n".join(parts) + "\n")
     texts["motion"] = _replace(texts["motion"], "constraints", f"CONSTRAINED = {constrained}")
     if touching:
-        texts["step"] = _replace(texts["step"], "events", "move, linearise_move = event_step, linearise_events")
+        texts["step"] = _replace(texts["step"], "events", "move, linearise = event_step, linearise_events")
     return "\n\n".join(texts.values())
 
 

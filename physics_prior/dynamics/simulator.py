@@ -202,9 +202,10 @@ class Simulator:
         """(rows,) how far q is off the constraints, m."""
         out = np.zeros(self.rows)
         self.move(q, v)
-        self._move_anchors()
-        constraint.place(self._work, self._pairs)
-        constraint.position_error(self._pairs, out)
+        if self.rows:
+            self._move_anchors()
+            constraint.place(self._work, self._pairs)
+            constraint.position_error(self._pairs, out)
         return -out
 
     def move(self, q: np.ndarray, v: np.ndarray) -> None:
@@ -280,7 +281,8 @@ class Simulator:
         count = len(self._links)
         if vdot is None:
             self._evaluate(q, v, self._still, self._vdot)
-            constraint.load_links(self._work, self._pairs)
+            if self.rows:
+                constraint.load_links(self._work, self._pairs)
             for row, (_, first, last) in enumerate(self._labels, start=count):
                 own = self._pairs[first:last]
                 out[row, :3] = own["force"].sum(axis=0)

@@ -2,7 +2,8 @@
 
 The composer (dynamics/compose.py) writes it as one module: the scene's equation of motion (motion.py), its integrator
 (integrators/), the events of contact where there is any (contact/events.py), and this. ``memory`` is that of memory.py; its
-seventh number is the time, s.
+seventh number is the time, s. ``linearise`` is the integrator's own, or that of the events: a function around it would be
+optimised once more, for seconds.
 """
 
 import math
@@ -11,7 +12,7 @@ from physics_prior.dynamics.integrators.rk4 import linearise_smooth, smooth_step
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.types import Array
 
-move, linearise_move = smooth_step, linearise_smooth  # scene: events
+move, linearise = smooth_step, linearise_smooth  # scene: events
 
 
 @kernel
@@ -32,15 +33,3 @@ def advance(memory: Array, q: Array, v: Array, extra: Array, h: float, count: in
     for k in range(q.shape[0]):
         total += abs(q[k])
     return rank if math.isfinite(total) else -1
-
-
-@kernel
-def linearise(
-    memory: Array, tangent: Array, q: Array, v: Array, extra: Array, h: float, force_noise: Array, F: Array, G: Array
-) -> int:
-    """Make one step as ``advance`` does, fill its derivatives and return the rank, or a negative number as ``advance`` does.
-
-    F (2 nv, 2 nv): the new error by the old. G (2 nv, 2 nv): a factor of what white generalized forces of density
-    force_noise (nv,) [N sqrt(s), N m sqrt(s)] add over the step.
-    """
-    return linearise_move(memory, tangent, q, v, extra, h, force_noise, F, G)

@@ -14,7 +14,7 @@ AHEAD = 10_000_000  # ns of prediction
 def warm_up(scene: Scene) -> None:
     """Run a throwaway estimator of the scene on a few simulated measurements; all its kernels are compiled then.
 
-    Takes half a minute where the kernels are not in the cache on disk, a tenth of a second where they are.
+    Takes 15 to 40 s where the kernels are not in the cache on disk, a tenth of a second where they are.
     """
     estimator = Estimator(scene)
     for moment in islice(motion(scene, estimator.simulator), MOMENTS):

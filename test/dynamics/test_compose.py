@@ -1,15 +1,18 @@
 """A scene's step holds the effects that it names and nothing else; an edit of an effect is never missed."""
 
 import ast
+import gc
 import importlib.util
 import sys
 
 import numpy as np
 import pytest
+from numba.core import event
+from numba.core.errors import TypingError
 
 from physics_prior.dynamics.compose import GRAVITY, pack_parameters, step_module, step_source
 from physics_prior.dynamics.integrators import INTEGRATORS
-from physics_prior.dynamics.kernel import cache_directory
+from physics_prior.dynamics.kernel import cache_directory, kernel
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects.attachment import Attachment
 from physics_prior.effects.gravity import Gravity
@@ -76,7 +79,7 @@ def test_step_is_motion_integrator_and_step_in_one_module(integrator):
     imports = [node.module for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ImportFrom)]
     assert not any(module.endswith(".motion") or "integrators" in module for module in imports)
     functions = [node.name for node in ast.parse(text).body if isinstance(node, ast.FunctionDef)]
-    order = [functions.index(name) for name in ("evaluate", "smooth_step", "linearise_smooth", "advance", "linearise")]
+    order = [functions.index(name) for name in ("evaluate", "smooth_step", "linearise_smooth", "advance")]
     assert order == sorted(order)
     assert len(functions) == len(set(functions))
 
@@ -148,3 +151,23 @@ def test_cache_is_keyed_by_the_kernels_sources(monkeypatch, tmp_path):
     finally:
         monkeypatch.undo()
         cache_directory.cache_clear()
+
+
+def test_garbage_collector_rests_while_kernels_compile_and_works_again_after_failures():
+    seen = []
+
+    class Look(event.Listener):
+        def on_start(self, event):
+            seen.append(gc.isenabled())
+
+        def on_end(self, event):
+            pass
+
+    with event.install_listener("numba:run_pass", Look()):
+        assert kernel(lambda number: number + 1.0)(1.0) == 2.0
+    assert seen
+    assert not any(seen)
+    assert gc.isenabled()
+    with pytest.raises(TypingError):
+        kernel(lambda number: number.none)(1.0)
+    assert gc.isenabled()

@@ -3,7 +3,7 @@
 from physics_prior.effects.attachment import Attachment, Hinge, Rod, Weld
 from physics_prior.effects.contact import Contact
 from physics_prior.effects.drag import Drag
-from physics_prior.effects.effect import Anchor, CompiledForce, Effect, PointPair
+from physics_prior.effects.effect import Anchor, CompiledForce, Effect, PointNoise, PointPair
 from physics_prior.effects.gravity import Gravity
 from physics_prior.effects.joint_damping import JointDamping
 from physics_prior.effects.joint_limit import JointLimit
@@ -26,6 +26,6 @@ _EFFECTS = (
     Weld,
 )
 REGISTRY: dict[str, type[Effect]] = {effect.kind: effect for effect in _EFFECTS}
-"""Every effect a scene may name, by its key in the scene file."""
+"""Every built-in effect, by its key in the scene file; users' packages add their own (plug_ins.py)."""
 
-__all__ = ["REGISTRY", "Anchor", "CompiledForce", "Effect", "PointPair"]
+__all__ = ["REGISTRY", "Anchor", "CompiledForce", "Effect", "PointNoise", "PointPair"]

@@ -1,6 +1,7 @@
 """Drag of a medium that a part moves through."""
 
 import math
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -18,7 +19,7 @@ from physics_prior.dynamics.point_force import (
     world_velocity,
 )
 from physics_prior.dynamics.types import Array, Records, Spatial, Vector
-from physics_prior.effects.effect import Anchor, CompiledForce, Effect
+from physics_prior.effects.effect import Anchor, CompiledForce, Effect, PointNoise
 from physics_prior.effects.two_points import Vector as Point
 from physics_prior.errors import ModelError
 from physics_prior.model import Tree
@@ -86,6 +87,9 @@ class Drag(Effect):
     )
     angular: float = Field(default=0.0, ge=0.0, description="N m s/rad: moment per angular speed; >= 0")
     wind: Point = Field(default=(0.0, 0.0, 0.0), description="m/s, velocity of the medium, world axes")
+    gusts: Point = Field(
+        default=(0.0, 0.0, 0.0), description="N sqrt(s): roots of the spectral densities of a white force, world axes"
+    )
 
     def check(self, tree: Tree) -> None:
         if tree.frame(self.part).link < 0:
@@ -99,9 +103,12 @@ class Drag(Effect):
             for value, unit in ((self.linear, "N s/m"), (self.quadratic, "N s^2/m^2"), (self.angular, "N m s/rad"))
             if value
         ]
-        wind = " in wind" if any(self.wind) else ""
+        wind = f" in wind{' and gusts' * any(self.gusts)}" if any(self.wind) else " in gusts" * any(self.gusts)
         return f"resists the motion of {self.part}{wind}: {', '.join(terms)}"
 
     def parameters(self, tree: Tree) -> np.ndarray:
         link, point, _ = Anchor(self.part, np.array(self.point)).on_link(tree)
         return np.array([link, *point, self.linear, self.quadratic, self.angular, *self.wind])
+
+    def noise(self, tree: Tree) -> Sequence[PointNoise]:
+        return [PointNoise(Anchor(self.part, np.array(self.point)), np.array(self.gusts))] if any(self.gusts) else []

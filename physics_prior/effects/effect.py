@@ -51,6 +51,20 @@ class PointPair:
 
 
 @dataclass(frozen=True)
+class PointNoise:
+    """A white force on a point: what an effect does not know of its own force (gusts, a current's eddies).
+
+    Attributes:
+        at: where it acts.
+        density: (3,) roots of its spectral densities along the world's axes, N sqrt(s): over one second the impulse along an
+            axis has this standard deviation.
+    """
+
+    at: Anchor
+    density: np.ndarray
+
+
+@dataclass(frozen=True)
 class CompiledForce:
     """The compiled functions of an effect that pushes: imported by name into the generated step.
 
@@ -73,8 +87,8 @@ class Effect(BaseModel):
     """Base of all effects. One effect is one file: parameters with units and bounds, what it adds, why it is there.
 
     An effect overrides what it contributes: ``field`` (an acceleration all mass feels), ``compiled`` + ``parameters`` (a
-    force), ``point_pairs`` (equality rows), ``joint_ranges`` and ``touching_pairs`` (inequality rows). One with equality rows may
-    come and go: ``active_at``, ``switch_times``.
+    force), ``point_pairs`` (equality rows), ``joint_ranges`` and ``touching_pairs`` (inequality rows), ``noise``. One with
+    equality rows may come and go: ``active_at``, ``switch_times``.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, allow_inf_nan=False)
@@ -109,6 +123,10 @@ class Effect(BaseModel):
 
     def point_pairs(self, tree: Tree) -> Sequence[PointPair]:
         """Equality rows; empty for effects that only push."""
+        return ()
+
+    def noise(self, tree: Tree) -> Sequence[PointNoise]:
+        """White forces that simulations add and the estimator reckons with, beside the scene's own noise of forces."""
         return ()
 
     def active_at(self, time: float) -> bool:

@@ -20,12 +20,12 @@ FIRST, SECOND = 0.5 / WIDTH, 0.5 * math.sqrt(WIDTH**2 - 1.0) / WIDTH**2
 
 
 def carry(
-    simulator: Simulator, q: np.ndarray, v: np.ndarray, factor: np.ndarray, force: np.ndarray, h: float
+    simulator: Simulator, q: np.ndarray, v: np.ndarray, factor: np.ndarray, forces: np.ndarray, h: float
 ) -> np.ndarray:
     """Move q (nq,) and v (nv,) in place by one step of h seconds; return (2 nv, 2 nv + g), the factor carried and noise.
 
-    Noise are white forces of density force (nv,) [N sqrt(s) or N m sqrt(s)], one value a step, what is uncertain about the
-    contacts, and second differences.
+    Noise are white forces, the columns of forces (nv, f) [N sqrt(s) or N m sqrt(s)], one value a step, what is uncertain
+    about the contacts, and second differences.
     """
     nv, time, still, here = simulator.nv, simulator.time, np.zeros(simulator.nv), np.zeros(2 * simulator.nv)
     q_start, v_start = q.copy(), v.copy()
@@ -45,9 +45,8 @@ def carry(
         (end(WIDTH * column, still), end(-WIDTH * column, still)) if column.any() else (here, here)
         for column in factor.T
     ]
-    for k in np.flatnonzero(force):
-        tau = np.zeros(nv)
-        tau[k] = WIDTH * force[k] / math.sqrt(h)
+    for column in forces.T[forces.any(axis=0)]:
+        tau = WIDTH * column / math.sqrt(h)
         pairs.append((end(here, tau), end(here, -tau)))
     for vary in _uncertain(simulator.candidates):
         vary(WIDTH)

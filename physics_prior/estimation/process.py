@@ -13,6 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
+from physics_prior.dynamics.force_noise import PointForces
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.estimation import events
 from physics_prior.estimation.square_root import carry_factor
@@ -90,6 +91,7 @@ class PhysicsProcess(_OnManifold):
 
     def __init__(self, scene: Scene, simulator: Simulator) -> None:
         super().__init__(scene, simulator, 2 * simulator.nv)
+        self._effects_noise = PointForces(simulator)
 
     def start(self, q: np.ndarray, v: np.ndarray) -> State:
         return State(q, v, np.zeros(0))
@@ -98,12 +100,21 @@ class PhysicsProcess(_OnManifold):
         return np.zeros(0)
 
     def advance(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
-        return self.simulator.linearise(state.q, state.v, h, self.scene.noise.force)
+        force, nv = self.scene.noise.force, self.simulator.nv
+        if not self._effects_noise.count:
+            return self.simulator.linearise(state.q, state.v, h, force)
+        columns = self._columns(state)
+        F, G = self.simulator.linearise(state.q, state.v, h, np.ones(nv))  # G is linear in the forces
+        return F, np.hstack([G[:, :nv] @ columns, G[:, nv:] @ columns])
 
     def carry(self, state: State, factor: np.ndarray, h: float) -> np.ndarray:
         if not len(self.simulator.candidates):
             return super().carry(state, factor, h)
-        return events.carry(self.simulator, state.q, state.v, factor, self.scene.noise.force, h)
+        return events.carry(self.simulator, state.q, state.v, factor, self._columns(state), h)
+
+    def _columns(self, state: State) -> np.ndarray:
+        """(nv, g): what generalized forces the independent white ones make, the scene's own first."""
+        return np.hstack([np.diag(self.scene.noise.force), self._effects_noise.columns(state.q, state.v)])
 
 
 class KinematicProcess(_OnManifold):

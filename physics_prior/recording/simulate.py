@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from physics_prior import __version__, rotations
+from physics_prior.dynamics.force_noise import PointForces
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.errors import SimulationError
 from physics_prior.estimation.measurement import (
@@ -68,6 +69,7 @@ def motion(
     count = _count(scene, seed, duration)
     streams = np.random.SeedSequence(seed).spawn(1 + len(scene.measurements))
     force_noise, *noises = (np.random.Generator(np.random.PCG64(stream)) for stream in streams)
+    gusts = PointForces(simulator)
     q, v = scene.initial.q.copy(), scene.initial.v.copy()
     try:
         simulator.begin(q, v)
@@ -85,6 +87,8 @@ def motion(
             inner, h = steps((stretch.end - stretch.begin) * 1e-9, scene.step.size)
             for _ in range(inner):
                 tau = scene.noise.force * force_noise.normal(size=simulator.nv) / math.sqrt(h)
+                if gusts.count:
+                    tau += gusts.columns(q, v) @ force_noise.normal(size=gusts.count) / math.sqrt(h)
                 simulator.advance(q, v, h, tau=tau if scene.simulation.force_noise else None)
             simulator.time = stretch.end * 1e-9
             simulator.switches.follow(stretch.events, q, v)

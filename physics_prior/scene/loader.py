@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from physics_prior.effects import REGISTRY, Effect
+from physics_prior.effects.plug_ins import effect_loaders
 from physics_prior.errors import PhysicsPriorError, SceneError
 from physics_prior.model import Tree
 from physics_prior.resources import scene_path
@@ -57,8 +58,13 @@ def _read_effects(place: Place, tree: Tree) -> tuple[Effect, ...]:
     effects: list[Effect] = []
     joints = [joint.name for joint in tree.joints]
     known = list(tree.frames) + joints
+    loaders = effect_loaders(REGISTRY)
     for entry in place.entries():
-        _, effect_type, inner = choose(entry, REGISTRY, "an effect")
+        _, load, inner = choose(entry, loaders, "an effect")
+        try:
+            effect_type = load()
+        except SceneError as error:
+            raise entry.error(str(error)) from None
         effect = validate(effect_type, inner, _in_si_units(effect_type, inner, effect_type.words))
         try:
             check_name(effect.label)
@@ -118,6 +124,7 @@ def _check_finite(effect: Effect, tree: Tree) -> bool:
     with np.errstate(all="ignore"):
         pairs = effect.point_pairs(tree)
         arrays = [effect.field(), effect.parameters(tree)]
+        arrays += [array for noise in effect.noise(tree) for array in (noise.at.point, noise.density)]
         arrays += [array for pair in pairs for array in (pair.a.point, pair.b.point, pair.directions)]
         arrays += [pair.motion.table(np.eye(3)) for pair in pairs if pair.motion is not None]
     if not all(np.all(np.isfinite(array)) for array in arrays):

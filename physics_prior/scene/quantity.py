@@ -97,7 +97,7 @@ def stated_units(description: str | None) -> tuple[str, ...]:
     "joint name -> N m s/rad (revolute) or N s/m (prismatic); >= 0" gives both units; a text that opens
     with no unit gives none.
     """
-    head = re.split(r"[,;:]", re.sub(r"\(.*?\)", "", description or ""))[0].split("->")[-1]
+    head = re.split(r"[,;:]", re.sub(r"(?<!sqrt)\(.*?\)", "", description or ""))[0].split("->")[-1]
     units = tuple(" ".join(part.split()) for part in head.split(" or "))
     try:
         for unit in units:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from physics_prior.dynamics.force_noise import PointForces
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects.drag import Drag
 from physics_prior.effects.gravity import Gravity
@@ -56,3 +57,14 @@ def test_drag_off_the_centre_turns_into_the_wind(ball):
     assert np.allclose(vdot[:3], force / MASS, rtol=1e-14)
     turning = np.cross([0.0, 0.0, 0.2], force) / ball.links[0].mass_properties.inertia[1, 1]
     assert np.allclose(vdot[3:], turning, rtol=1e-14)
+
+
+def test_gusts_push_where_the_drag_acts(ball):
+    """White forces at a point are, in the body's freedoms, J^T along each axis that has any."""
+    drag = Drag(part="ball", point=(0.0, 0.0, 0.2), linear=1.0, gusts=(0.5, 0.0, 2.0))
+    forces = PointForces(Simulator(ball, [Gravity(), drag]))
+    columns = forces.columns(ball.neutral(), np.zeros(6))
+    assert forces.count == 2
+    assert np.allclose(columns[:, 0], [0.5, 0.0, 0.0, 0.0, 0.1, 0.0], atol=1e-15)
+    assert np.allclose(columns[:, 1], [0.0, 0.0, 2.0, 0.0, 0.0, 0.0], atol=1e-15)
+    assert drag.explain(ball).startswith("resists the motion of ball in gusts: 1 N s/m")

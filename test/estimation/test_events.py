@@ -22,7 +22,7 @@ def noise():
 
     def covariance(height, velocity):
         q, v = np.array([0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0]), np.array([*velocity, 0.0, 0.0, 0.0])
-        W = carry(simulator, q, v, np.zeros((12, 12)), np.zeros(6), H)
+        W = carry(simulator, q, v, np.zeros((12, 12)), np.zeros((6, 0)), H)
         return W @ W.T
 
     return covariance

@@ -3,8 +3,12 @@
 With --peers, Pinocchio and MuJoCo (their PyPI wheels, extra 'bench') take turns with ours in one run on one core; a ratio
 above 1 means that we are faster. Before anything is timed, the engines' results are compared.
 
+With --effects, each built-in effect is taken out of a copy of the program instead, and a scene that does not name it is compiled
+and run in both: the same bits, the same instructions. Takes some two to three minutes.
+
 Examples:
   physics-prior bench
+  physics-prior bench --effects
   physics-prior bench --peers --json bench.json
 """
 
@@ -16,12 +20,17 @@ from physics_prior.commands.terminal import STDOUT, console, progress, require_f
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the arguments of `bench`."""
     parser.add_argument("--peers", action="store_true", help="time Pinocchio and MuJoCo too")
+    parser.add_argument(
+        "--effects", action="store_true", help="show that effects cost nothing where they are not named"
+    )
     parser.add_argument("--json", metavar="FILE", help="write the figures as JSON; - prints that and nothing else")
 
 
 def run(args: argparse.Namespace) -> int:
     """Time the kernels; 0."""
     require_folder("--json", args.json)
+    if args.effects:
+        return _effects(args)
     from physics_prior.studies.bench import run_bench, table
 
     with progress("timing") as report:
@@ -30,4 +39,16 @@ def run(args: argparse.Namespace) -> int:
         write_json(args.json, figures)
     if args.json != STDOUT:
         console().print(table(figures))
+    return 0
+
+
+def _effects(args: argparse.Namespace) -> int:
+    from physics_prior.studies.effect_costs import run_effect_costs, table
+
+    with progress("building and running") as report:
+        figures = run_effect_costs(progress=report)
+    if args.json is not None:
+        write_json(args.json, figures)
+    if args.json != STDOUT:
+        console().print(table(figures), soft_wrap=True)
     return 0

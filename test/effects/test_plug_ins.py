@@ -92,7 +92,7 @@ def test_simulations_blow_as_hard_as_the_estimator_reckons(install):
     scene = load_scene(path)
     simulator, across, seconds = scene.simulator(), np.array([0.0, 1.0, 0.0]), 0.02
     ends = [list(motion(scene, simulator, seed=seed, duration=seconds))[-1].v[:3] @ across for seed in range(400)]
-    assert np.std(ends) == pytest.approx(0.1 / scene.tree.mass * np.sqrt(seconds), rel=0.1)  # measured 1.034, three deviations of the estimate are 0.11
+    assert np.std(ends) == pytest.approx(0.1 / scene.tree.mass * np.sqrt(seconds), rel=0.1)  # measured 1.034
 
 
 @pytest.mark.parametrize(

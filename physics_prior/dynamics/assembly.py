@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from physics_prior.dynamics.projection import FARTHEST
 from physics_prior.effects.holding import Holding
 from physics_prior.errors import SimulationError
 
@@ -67,6 +68,7 @@ def _descend(simulator: "Simulator", q: np.ndarray) -> float:
         A, _ = simulator.tangent_rows(q, still)
         responses = _responses(simulator, q, A)
         step = -responses @ _pseudo_solve(A @ responses, error)
+        step *= min(1.0, FARTHEST / max(float(np.max(np.abs(step))), FARTHEST))
         tried, length = _search(simulator, q, step, size)
         if length == 0.0:
             break

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from physics_prior.errors import ModelError
+from physics_prior.model import JointKind
+from physics_prior.model.tree import Link
 
 if TYPE_CHECKING:
     from physics_prior.dynamics.simulator import Simulator
@@ -24,8 +26,8 @@ def check_inertia(simulator: "Simulator") -> None:
     for _ in range(POSTURES):
         q = tree.integrate(tree.neutral(), rng.normal(size=tree.nv))
         M = simulator.mass_matrix(q)
-        inertia = np.diag(M)
-        lacking = [k for link in tree.links for k in _idle(inertia, link.v)]
+        inertia, moments = np.diag(M), _moments(simulator)
+        lacking = [k for link, moment in zip(tree.links, moments, strict=True) for k in _idle(inertia, link, moment)]
         if lacking:
             worst = lacking[0]
         else:
@@ -40,8 +42,23 @@ def check_inertia(simulator: "Simulator") -> None:
         )
 
 
-def _idle(inertia: np.ndarray, v: slice) -> list[int]:
-    """The degrees of freedom v of a joint that move nothing but rounding, against the others that turn about it."""
-    turning = range(v.start, v.stop)[-3:]
+def _idle(inertia: np.ndarray, link: Link, moment: float) -> list[int]:
+    """The degrees of freedom of a link that move nothing but rounding, against its others or the moment that it carries."""
+    turning = range(link.v.start, link.v.stop)[-3:]
     largest = max(inertia[k] for k in turning)
+    if link.joint.kind is JointKind.REVOLUTE:
+        largest = max(largest, moment)
     return [k for k in turning if not inertia[k] > ROUNDING * largest]
+
+
+def _moments(simulator: "Simulator") -> np.ndarray:
+    """(links,) the polar moment of all that each carries about its joint, kg m^2: no axis has more; needs ``move``."""
+    links, work = simulator.memory.links, simulator.memory.work
+    moments = np.zeros(len(links))
+    for i, link in enumerate(links):
+        carrier = i
+        while carrier >= 0:
+            arm = work[i]["origin"] + work[i]["center"] - work[carrier]["origin"]
+            moments[carrier] += link["inertia"][[0, 3, 5]].sum() + link["mass"] * (arm @ arm)
+            carrier = int(links[carrier]["parent"])
+    return moments

@@ -17,10 +17,10 @@ from physics_prior.dynamics.kernel import inline_kernel
 from physics_prior.dynamics.records import LINK, PAIR, WORK
 from physics_prior.dynamics.types import Array
 
-HEAD = 11
-TIME, TOLERANCE, VECTORS, WORKSPACE, CONTACT_PART = 6, 7, 8, 9, 10
-"""Where the head has the time since the scene's beginning, s, the integrator's tolerance, the sizes of its scratch, and where
-the part for contacts begins (contact/memory.py)."""
+HEAD = 12
+TIME, TOLERANCE, VECTORS, WORKSPACE, CONTACT_PART, OPEN = 6, 7, 8, 9, 10, 11
+"""Where the head has the time since the scene's beginning, s, the integrator's tolerance, the sizes of its scratch, where
+the part for contacts begins (contact/memory.py), and how far off its constraints, m, the last step ended."""
 LINK_SIZE, WORK_SIZE, PAIR_SIZE = LINK.itemsize // 8, WORK.itemsize // 8, PAIR.itemsize // 8
 FREEDOM_SIZE, COMPOSITE_SIZE, GAP_SIZE = FREEDOM.itemsize // 8, COMPOSITE.itemsize // 8, GAP.itemsize // 8
 FLOAT = np.dtype(np.float64)

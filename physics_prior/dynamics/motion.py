@@ -26,7 +26,7 @@ from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kinematics import flow, pose, weigh
 from physics_prior.dynamics.manifold import displace
 from physics_prior.dynamics.mass_factor import factorize_mass, solve_mass
-from physics_prior.dynamics.memory import SPARE, TIME, correction_sections, sections, tangent_sections
+from physics_prior.dynamics.memory import OPEN, SPARE, TIME, correction_sections, sections, tangent_sections
 from physics_prior.dynamics.projection import project
 from physics_prior.dynamics.types import Array
 from physics_prior.effects.none import differentiate_forces, forces, potential_energy  # scene: effects
@@ -213,7 +213,7 @@ def settle(memory: Array, q: Array, v: Array) -> None:
     links, work, pairs, rows, known, _, spare, parameters = sections(memory)
     if CONSTRAINED:
         move_anchors(work, pairs, parameters, memory[TIME])
-        project(links, work, pairs, rows, known, q, v, spare, POSITION_TOLERANCE)
+        memory[OPEN] = project(links, work, pairs, rows, known, q, v, spare, POSITION_TOLERANCE)
 
 
 @kernel

@@ -13,7 +13,7 @@ from physics_prior.dynamics.contact.reactions import candidates_by_name, reactio
 from physics_prior.dynamics.contact.records import candidate_records
 from physics_prior.dynamics.inertia_check import check_inertia
 from physics_prior.dynamics.integrators import DEFAULT, INTEGRATORS, TOLERATED, IntegratorName
-from physics_prior.dynamics.memory import SPARE, TIME, TOLERANCE, Memory, correction_size, tangent_size
+from physics_prior.dynamics.memory import OPEN, SPARE, TIME, TOLERANCE, Memory, correction_size, tangent_size
 from physics_prior.dynamics.records import link_records, motion_tables, moved_freedoms, pair_records
 from physics_prior.dynamics.switches import Switches
 from physics_prior.dynamics.wrench import Wrench
@@ -130,7 +130,8 @@ class Simulator:
         """Move q and v in place by count steps of h seconds, under constant extra forces tau (nv,).
 
         Raises:
-            SimulationError: the motion left the numbers, or an integrator found no solution (a step far too large for it).
+            SimulationError: the motion left the numbers or came apart, or an integrator found no solution (a step far too
+                large for it).
         """
         extra = self._still if tau is None else tau
         self.rank = self._moved(self.step.advance(self.memory.array, q, v, extra, h, count), h)
@@ -145,11 +146,12 @@ class Simulator:
         constraints.
 
         Raises:
-            SimulationError: an integrator found no solution.
+            SimulationError: an integrator found no solution, or what holds came apart.
         """
         F, G = np.empty((2 * self.nv, 2 * self.nv)), np.empty((2 * self.nv, 2 * self.nv))
         rank = self.step.linearise(self.memory.array, self.tangent_array(), q, v, self._still, h, force_noise, F, G)
-        self.rank = self._moved(rank, h)
+        open_now = rank >= 0 and self.memory.array[OPEN] > projection.APART
+        self.rank = self._moved(-3 if open_now else rank, h)
         return F, G
 
     def project(self, q: np.ndarray, v: np.ndarray) -> float:
@@ -344,6 +346,11 @@ class Simulator:
         if rank == -1:
             raise SimulationError(
                 f"the motion is not finite after a step of {h:g} s: a smaller step size or another integrator may do"
+            )
+        if rank == -3:
+            raise SimulationError(
+                f"{self.switches.furthest()} is open by {self.memory.array[OPEN]:.3g} m after a step of {h:g} s, and cannot be"
+                " closed from there: a smaller step size may do"
             )
         if rank < 0:
             raise SimulationError(

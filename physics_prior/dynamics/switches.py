@@ -186,10 +186,10 @@ class Switches:
         energy = _kinetic_energy(simulator, q, v)
         left = assemble(simulator, q, v)
         if not (np.isfinite(q).all() and np.isfinite(v).all()):
-            raise SimulationError(f"{self._worst()} cannot take hold: {UNLIKE}")
+            raise SimulationError(f"{self.furthest()} cannot take hold: {UNLIKE}")
         if not left <= ASSEMBLED:
             raise SimulationError(
-                f"{self._worst()} cannot take hold: {left:.3g} m stay between the points that it joins"
+                f"{self.furthest()} cannot take hold: {left:.3g} m stay between the points that it joins"
             )
         for index in turned_over(simulator):
             raise SimulationError(
@@ -201,7 +201,7 @@ class Switches:
         if not np.any(simulator.memory.pairs["motion"]):
             # the impulse is a projection in the mass metric, so it takes energy
             if after > (1.0 + GAIN) * _kinetic_energy(simulator, q, speed):
-                raise SimulationError(f"{self._worst()} cannot take hold: {UNLIKE}")
+                raise SimulationError(f"{self.furthest()} cannot take hold: {UNLIKE}")
             if moved > MOVED and after > energy:
                 v *= np.sqrt(energy / after)
         return impulses
@@ -250,7 +250,7 @@ class Switches:
                 out[label] = Wrench(forces.sum(axis=0), moment, np.array(pairs["b"][0]))
         return out
 
-    def _worst(self) -> str:
+    def furthest(self) -> str:
         """The effect whose points are furthest apart."""
         pairs = self._simulator.memory.pairs
         gaps = np.linalg.norm(pairs["b"] - pairs["a"], axis=1)

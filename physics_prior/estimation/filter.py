@@ -36,6 +36,7 @@ class Posterior:
         refused: how many the gate has refused since.
         used: whether the last one was believed; None where it said nothing or did not fit.
         nis: its normalised innovation squared; dimension: what that is expected to be.
+        log_determinant: of the covariance of that innovation.
         start: whether it is a (re)start from measurements alone.
         begun: stamp of the scene's time zero, ns.
         holds: what holds, effect by effect of those that can.
@@ -50,6 +51,7 @@ class Posterior:
     used: bool | None = None
     nis: float = 0.0
     dimension: int = 0
+    log_determinant: float = 0.0
     start: bool = False
     begun: int = 0
     holds: tuple[Hold, ...] = ()
@@ -94,7 +96,12 @@ class Filter:
             raise SimulationError(
                 f"the prediction is not finite after steps of {h:g} s: a smaller step size or the other integrator may do"
             )
-        return replace(posterior, stamp=stamp, state=state, factor=factor, used=None, nis=0.0, dimension=0, start=False)
+        return replace(self._fresh(posterior), stamp=stamp, state=state, factor=factor)
+
+    @staticmethod
+    def _fresh(posterior: Posterior) -> Posterior:
+        """The posterior before a measurement has said anything."""
+        return replace(posterior, used=None, nis=0.0, dimension=0, log_determinant=0.0, start=False)
 
     def enter(self, posterior: Posterior) -> None:
         """Have the simulator hold what the posterior holds, at its time."""
@@ -134,7 +141,7 @@ class Filter:
 
         Iterated (Gauss-Newton, Bell and Cathey 1993) where the correction is too large for one linearisation.
         """
-        prior = replace(prior, used=None, nis=0.0, dimension=0, start=False)
+        prior = self._fresh(prior)
         if not self.observes(measurement):
             active = [hold.active for hold in prior.holds]
             return switching.switch(self, prior, *switching.decision(self, measurement, active))
@@ -145,8 +152,9 @@ class Filter:
             return prior
         W, whitened = np.empty((m + n, m + n)), np.empty(m)
         nis = innovate(prior.factor, seen.H, seen.noise, W, whitened, seen.y)
+        prior = replace(prior, nis=nis, dimension=m, log_determinant=2.0 * float(np.sum(np.log(np.diag(W)[:m]))))
         if gated and not nis <= self.gate_limit(m):
-            return replace(prior, refused=prior.refused + 1, used=False, nis=nis, dimension=m)
+            return replace(prior, refused=prior.refused + 1, used=False)
         correction = W[m:, :m] @ whitened
         state = self.process.displace(prior.state, correction)
         for _ in range(ITERATIONS - 1):
@@ -168,8 +176,6 @@ class Filter:
             accepted=prior.stamp,
             refused=0,
             used=True,
-            nis=nis,
-            dimension=m,
             holds=self.simulator.switches.holds,
         )
 

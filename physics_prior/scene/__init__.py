@@ -1,6 +1,6 @@
 """Model, effects, measurements, noise and readouts of one scene, read from one file."""
 
-from physics_prior.scene.loader import load_scene
+from physics_prior.scene.loader import build_scene, load_scene
 from physics_prior.scene.measurements import (
     JointSource,
     Marker,
@@ -43,5 +43,6 @@ __all__ = [
     "Simulation",
     "Step",
     "SwitchSource",
+    "build_scene",
     "load_scene",
 ]

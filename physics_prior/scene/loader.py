@@ -28,8 +28,16 @@ def load_scene(name_or_path: str | Path) -> Scene:
     Raises:
         SceneError: no such scene, or one sentence `FILE:LINE: FIELD: what is wrong and what would be valid`.
     """
-    path = scene_path(name_or_path)
-    top = read_yaml(path)
+    return build_scene(read_yaml(scene_path(name_or_path)))
+
+
+def build_scene(top: Place) -> Scene:
+    """Build the scene that the top of a file describes.
+
+    Raises:
+        SceneError: as ``load_scene``.
+    """
+    path = top.path
     file = validate(SceneFile, top)
     tree = build_tree(top["model"])
     effects = _read_effects(top.get("effects"), tree)

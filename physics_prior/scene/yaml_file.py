@@ -139,6 +139,11 @@ def read_yaml(path: Path) -> Place:
         raise SceneError(f"{path}:{line}: byte 0x{raw[error.start]:02x} is not UTF-8: save it as UTF-8") from None
     if len(raw) > MAXIMUM_BYTES:
         raise SceneError(f"{path}: has more than {MAXIMUM_BYTES} bytes, the most that is accepted")
+    return parse_yaml(path, text)
+
+
+def parse_yaml(path: Path, text: str) -> Place:
+    """Parse the text of a file as ``read_yaml`` does; path is what errors name."""
     try:
         top = _Builder(path, text).build()
     except yaml.reader.ReaderError as error:

@@ -1,0 +1,163 @@
+"""Each effect of a scene with and without: is it worth its cost on this recording?
+
+An effect is kept where it raises the log-likelihood by more than its numbers would by chance: k / 2 log n for k numbers and n
+rows measured (Schwarz 1978, the Bayesian information criterion). A proposed effect is first fitted: one of the wrong strength
+would be refused for that.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from statistics import median
+from time import perf_counter
+from typing import Any
+
+from physics_prior.errors import SceneError
+from physics_prior.estimation.measurement import Measurement
+from physics_prior.scene import Scene
+from physics_prior.studies.effects.fit import fit
+from physics_prior.studies.effects.likelihood import Likelihood, likelihood
+from physics_prior.studies.effects.variant import SceneText, kind_of, label_of
+
+ROUNDS, STEPS = 15, 200  # of the timing: so many bursts, in turns, of so many steps
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a recording says of an effect.
+
+    Attributes:
+        name, kind: of the effect; proposed: whether it is not in the scene.
+        keep: whether it is worth having; evidence: why, in one sentence.
+        delta_log_likelihood: with it, less without; None where the recording cannot be followed without it.
+        threshold: what that must exceed.
+        us_per_step: what it adds to a step, us; None where it cannot be left out.
+        nis_with, nis_without, forecast_with, forecast_without: as Likelihood says; None where there is none.
+        fitted: numbers of a proposed effect at their best, by path.
+    """
+
+    name: str
+    kind: str
+    proposed: bool
+    keep: bool
+    evidence: str
+    delta_log_likelihood: float | None
+    threshold: float
+    us_per_step: float | None
+    nis_with: float | None = None
+    nis_without: float | None = None
+    forecast_with: float | None = None
+    forecast_without: float | None = None
+    fitted: dict[str, float] | None = None
+
+    def figures(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+def ablate(
+    scene: SceneText,
+    measurements: Sequence[Measurement],
+    proposed: Sequence[Any] = (),
+    report: Callable[[float, str], None] = lambda share, now: None,
+) -> list[Verdict]:
+    """Try every effect of a scene, and proposed ones as they would stand in its ``effects``, on measurements.
+
+    Raises:
+        SceneError: the scene or a proposed effect is not valid, or the scene as it stands cannot follow the recording.
+    """
+    whole = scene.build()
+    base = likelihood(whole, measurements)
+    if base is None:
+        raise SceneError(f"{scene.path}: the scene as it stands cannot follow the recording: nothing can be compared")
+    verdicts, total = [], len(scene.entries) + len(proposed)
+    for index, entry in enumerate(scene.entries):
+        report(index / total, f"without {label_of(entry)}")
+        numbers = max(1, len(scene.paths(index)))
+        try:
+            rest = scene.without(index).build()
+        except SceneError as problem:
+            verdicts.append(_indispensable(entry, numbers, base, str(problem)))
+            continue
+        found = likelihood(rest, measurements)
+        verdicts.append(_judge(entry, numbers, base, found, _cost(whole, rest) if found is not None else None))
+    for place, entry in enumerate(proposed):
+        report((len(scene.entries) + place) / total, f"with {label_of(entry)}")
+        larger = scene.added(entry)
+        larger.build()
+        paths = larger.paths(len(scene.entries))
+        best = fit(larger, paths, measurements) if paths else None
+        text = larger if best is None else best.scene
+        found = likelihood(text.build(), measurements)
+        numbers = {each.path: each.value for each in best.parameters} if best is not None else None
+        cost = _cost(text.build(), whole)
+        verdicts.append(_judge(entry, max(1, len(paths)), found, base, cost, numbers))
+    report(1.0, "done")
+    return verdicts
+
+
+def _judge(
+    entry: Any,
+    numbers: int,
+    having: Likelihood | None,
+    lacking: Likelihood | None,
+    cost: float | None,
+    fitted: dict[str, float] | None = None,
+) -> Verdict:
+    """The verdict on an effect; ``fitted`` tells that it is a proposed one."""
+    rows = having.rows if having is not None else 2
+    threshold = 0.5 * numbers * math.log(rows)
+    gain = having.log - lacking.log if having is not None and lacking is not None else None
+    keep = having is not None and (gain is None or gain > threshold)
+    name, price = label_of(entry), "" if cost is None else f" for {cost:.2g} us a step"
+    if having is None:
+        evidence = f"{name}: drop, with it the recording cannot be followed"
+    elif gain is None:
+        evidence = f"{name}: keep, without it the recording cannot be followed"
+    elif keep:
+        evidence = f"{name}: keep, {gain:+.4g} log-likelihood{price}"
+    else:
+        evidence = f"{name}: drop, no evidence ({gain:+.3g} log-likelihood, {threshold:.3g} needed){price}"
+    return Verdict(
+        name,
+        kind_of(entry),
+        fitted is not None,
+        keep,
+        evidence,
+        gain,
+        threshold,
+        cost,
+        *_pair(having, lacking, "nis"),
+        *_pair(having, lacking, "forecast"),
+        fitted,
+    )
+
+
+def _indispensable(entry: Any, numbers: int, base: Likelihood, why: str) -> Verdict:
+    evidence = f"{label_of(entry)}: keep, the scene is not valid without it: {why}"
+    threshold = 0.5 * numbers * math.log(base.rows)
+    return Verdict(label_of(entry), kind_of(entry), False, True, evidence, None, threshold, None)
+
+
+def _pair(having: Likelihood | None, lacking: Likelihood | None, name: str) -> tuple[float | None, float | None]:
+    values = [None if each is None else float(getattr(each, name)) for each in (having, lacking)]
+    first, second = (None if value is None or not math.isfinite(value) else value for value in values)
+    return first, second
+
+
+def _cost(larger: Scene, smaller: Scene) -> float:
+    """What a step of one scene costs more than that of another, us: the median of bursts in turns."""
+    moved = []
+    for scene in (larger, smaller):
+        simulator = scene.simulator()
+        q, v = scene.initial.q.copy(), scene.initial.v.copy()
+        simulator.begin(q, v)
+        moved.append((simulator, q, v, scene.step.size))
+    spans: list[list[float]] = [[], []]
+    for _ in range(ROUNDS):
+        for (simulator, q, v, h), own in zip(moved, spans, strict=True):
+            q_now, v_now = q.copy(), v.copy()
+            begun = perf_counter()
+            simulator.advance(q_now, v_now, h, STEPS)
+            own.append(perf_counter() - begun)
+    return 1e6 / STEPS * (median(spans[0]) - median(spans[1]))

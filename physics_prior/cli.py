@@ -18,6 +18,7 @@ COMMANDS = {
     "check": ("physics_prior.commands.check", "explain a scene: its parts, effects, constraints and what a step costs"),
     "simulate": ("physics_prior.commands.simulate", "record a bag of a scene: noisy measurements and the truth"),
     "replay": ("physics_prior.commands.replay", "estimate motion and forces from a recording"),
+    "effects": ("physics_prior.commands.effects", "tell which effects a recording calls for, and fit their numbers"),
     "stability": ("physics_prior.commands.stability", "run the hard cases on which engines break"),
     "bench": ("physics_prior.commands.bench", "time the kernels, alone or against other engines"),
 }

@@ -1,8 +1,9 @@
-"""Each effect of a scene with and without: is it worth its cost on this recording?
+"""Each effect of a scene with and without: whether it is worth its cost on a recording.
 
 An effect is kept where it raises the log-likelihood by more than its numbers would by chance: k / 2 log n for k numbers and n
 rows measured (Schwarz 1978, the Bayesian information criterion). A proposed effect is first fitted: one of the wrong strength
-would be refused for that.
+would be refused for that. Numbers of the scene that are free are fitted anew in every comparison: else drag would be kept
+because it makes up for a damping that is a little off.
 """
 
 import math
@@ -59,9 +60,12 @@ def ablate(
     scene: SceneText,
     measurements: Sequence[Measurement],
     proposed: Sequence[Any] = (),
+    free: Sequence[str] = (),
     report: Callable[[float, str], None] = lambda share, now: None,
 ) -> list[Verdict]:
     """Try every effect of a scene, and proposed ones as they would stand in its ``effects``, on measurements.
+
+    free: paths of numbers that stand at their best in the scene and are fitted anew in every comparison.
 
     Raises:
         SceneError: the scene or a proposed effect is not valid, or the scene as it stands cannot follow the recording.
@@ -75,25 +79,37 @@ def ablate(
         report(index / total, f"without {label_of(entry)}")
         numbers = max(1, len(scene.paths(index)))
         try:
-            rest = scene.without(index).build()
+            text = scene.without(index)
+            text.build()
         except SceneError as problem:
             verdicts.append(_indispensable(entry, numbers, base, str(problem)))
             continue
+        others = [path for path in free if not scene.belongs(path, index)]
+        rest = _best(text, others, measurements)[0].build()
         found = likelihood(rest, measurements)
         verdicts.append(_judge(entry, numbers, base, found, _cost(whole, rest) if found is not None else None))
     for place, entry in enumerate(proposed):
         report((len(scene.entries) + place) / total, f"with {label_of(entry)}")
         larger = scene.added(entry)
         larger.build()
-        paths = larger.paths(len(scene.entries))
-        best = fit(larger, paths, measurements) if paths else None
-        text = larger if best is None else best.scene
-        found = likelihood(text.build(), measurements)
-        numbers = {each.path: each.value for each in best.parameters} if best is not None else None
-        cost = _cost(text.build(), whole)
-        verdicts.append(_judge(entry, max(1, len(paths)), found, base, cost, numbers))
+        own = larger.paths(len(scene.entries))
+        text, numbers_found = _best(larger, [*own, *free], measurements)
+        better = text.build()
+        strengths = {path: numbers_found[path] for path in own}
+        found = likelihood(better, measurements)
+        verdicts.append(_judge(entry, max(1, len(own)), found, base, _cost(better, whole), strengths))
     report(1.0, "done")
     return verdicts
+
+
+def _best(
+    text: SceneText, paths: Sequence[str], measurements: Sequence[Measurement]
+) -> tuple[SceneText, dict[str, float]]:
+    """A scene with the numbers at some paths at their best, and these; as it stands if it cannot follow the recording."""
+    if paths and likelihood(text.build(), measurements) is not None:
+        found = fit(text, paths, measurements, intervals=False)
+        text = found.scene
+    return text, {path: text.number(path) for path in paths}
 
 
 def _judge(

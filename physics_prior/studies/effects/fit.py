@@ -18,8 +18,11 @@ from physics_prior.studies.effects.likelihood import likelihood
 from physics_prior.studies.effects.variant import SceneText
 
 WIDEST = math.log(1e3)  # a factor is sought between 1/1000 and 1000
+GAIN, ITERATIONS = 0.01, 30  # of log-likelihood by an iteration, below which a search ends, and how many it may take
 PROBE, FIRST_PROBE = 1e-3, 1e-2  # of the logarithm: steps of the gradient and of the first curvature
 CONFIDENCE = 0.95
+FAR, MOST_REFUSED = 1.5, 50  # NIS, and rows a refused measurement, beyond which a start is too far off for a search
+WIDENINGS = (16.0, 4.0, 1.0, 1.0)  # of all noise, from such a start: what fits nowhere has no slope to follow
 IMPOSSIBLE = 1e12  # minus the log-likelihood of a motion that leaves the numbers
 
 
@@ -39,7 +42,7 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Fit:
-    """Fitted parameters, the scene that they make and the log-likelihoods before and after."""
+    """Fitted parameters, the scene that they make and the log-likelihoods before (NaN if there was none) and after."""
 
     parameters: list[Fitted]
     scene: SceneText
@@ -52,46 +55,57 @@ def fit(
     paths: Sequence[str],
     measurements: Sequence[Measurement],
     told: Callable[[int], None] = lambda count: None,
+    intervals: bool = True,
 ) -> Fit:
     """Fit the numbers at some paths of a scene to measurements; told is told how many replays were made.
 
+    Without intervals, which take some replays more, their ends are NaN.
+
     Raises:
-        SceneError: a path leads to no number that can be scaled; SimulationError: the scene as it stands has no likelihood.
+        SceneError: a path leads to no number that can be scaled; SimulationError: no values follow the recording.
     """
     start = np.array([scene.number(path) for path in paths])
     replays = 0
 
-    def cost(logarithms: np.ndarray) -> float:
+    def cost(logarithms: np.ndarray, widening: float = 1.0) -> float:
         nonlocal replays
         replays += 1
         told(replays)
-        found = likelihood(_changed(scene, paths, logarithms).build(), measurements)
+        found = likelihood(_changed(scene, paths, logarithms).noisier(widening).build(), measurements)
         return IMPOSSIBLE if found is None else -found.log
 
-    origin = np.zeros(len(paths))
-    before = cost(origin)
-    if before == IMPOSSIBLE:
-        raise SimulationError(f"{scene.path}: no fit is possible: the scene as it stands cannot follow the recording")
-    best, lowest = origin, before
-    for _ in range(2):  # once more from where the first search ended: its curvature was learnt far away
+    best = np.zeros(len(paths))
+    first = likelihood(scene.build(), measurements)
+    before = math.nan if first is None else first.log
+    near = first is not None and first.nis < FAR and first.refused * MOST_REFUSED <= first.rows
+    for widening in (1.0, 1.0) if near else WIDENINGS:
+        here = cost(best, widening)
         found = minimize(
             cost,
             best,
+            (widening,),
             method="L-BFGS-B",
             bounds=[(-WIDEST, WIDEST)] * len(paths),
-            options={"eps": PROBE, "ftol": 1e-10, "maxiter": 60},
+            options={"eps": PROBE, "ftol": GAIN * widening / abs(here), "maxiter": ITERATIONS},
         )
-        if found.fun < lowest:
-            best, lowest = found.x, float(found.fun)
-    deviations = _deviations(cost, best, lowest)
+        if found.fun < here:
+            best = found.x
+    lowest = cost(best)
+    if lowest == IMPOSSIBLE:
+        raise SimulationError(
+            f"{scene.path}: no values of {list(paths)} were found with which it follows the recording"
+        )
+    deviations = _deviations(cost, best, lowest) if intervals else np.full(len(best), math.inf)
     z = float(norm.ppf(0.5 + 0.5 * CONFIDENCE))
     parameters = []
     for path, number, logarithm, deviation in zip(paths, start, best, deviations, strict=True):
         value = float(number * math.exp(logarithm))
         wide = not deviation * z < WIDEST
-        ends = sorted((value * math.exp(-z * deviation), value * math.exp(z * deviation))) if not wide else [math.nan] * 2
+        ends = (
+            sorted((value * math.exp(-z * deviation), value * math.exp(z * deviation))) if not wide else [math.nan] * 2
+        )
         parameters.append(Fitted(path, float(number), value, ends[0], ends[1]))
-    return Fit(parameters, _changed(scene, paths, best), -before, -lowest)
+    return Fit(parameters, _changed(scene, paths, best), before, -lowest)
 
 
 def _changed(scene: SceneText, paths: Sequence[str], logarithms: np.ndarray) -> SceneText:

@@ -75,10 +75,23 @@ class SceneText:
             inner[keys[-1]] = _scaled(inner[keys[-1]], factor)
         return SceneText(self.path, data)
 
+    def noisier(self, factor: float) -> "SceneText":
+        """The scene with all measurements, and the forces that it does not know, so many times as uncertain."""
+        paths = ["noise.force"] if _split((self.data.get("noise") or {}).get("force")) is not None else []
+        for place, entry in enumerate(self.data.get("measurements") or []):
+            for kind, fields in entry.items():
+                noises = [key for key in fields if key.endswith("noise")]
+                paths += [f"measurements.{place}.{kind}.{key}" for key in noises]
+        return self.scaled(dict.fromkeys(paths, factor)) if factor != 1.0 else self
+
     def paths(self, index: int) -> list[str]:
         """Paths of the numbers other than zero of the index-th effect."""
         entry = self.entries[index]
         return [".".join(map(str, ("effects", index, *keys))) for keys in _numbers(entry)]
+
+    def belongs(self, path: str, index: int) -> bool:
+        """Whether a path leads into the index-th effect."""
+        return self._keys(path)[:2] == ["effects", index]
 
     def _at(self, keys: list[Key]) -> Any:
         value: Any = self.data
@@ -103,7 +116,9 @@ class SceneText:
                 known = {key: key for key in value} if isinstance(value, dict) else {}
                 found = known.get(word)
             if found is None:
-                raise SceneError(f"{self.path}: parameter '{path}' is not there: at {word!r:.80}, known are {list(known)}")
+                raise SceneError(
+                    f"{self.path}: parameter '{path}' is not there: at {word!r:.80}, known are {list(known)}"
+                )
             keys.append(found)
             value = value[found]
             if keys[:1] == ["effects"] and len(keys) == 2 and isinstance(value, dict):  # {kind: fields}: step inside

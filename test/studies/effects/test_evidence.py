@@ -1,0 +1,102 @@
+"""The likelihood of recordings, and what it says of effects that are there and of those that are not."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from physics_prior.errors import RecordingError
+from physics_prior.resources import share_directory
+from physics_prior.studies.effects.ablation import ablate
+from physics_prior.studies.effects.drawing import draw
+from physics_prior.studies.effects.fit import fit
+from physics_prior.studies.effects.likelihood import likelihood, read_measurements, simulated_measurements
+
+PATH = "effects.joint_damping.coefficients.pivot"
+DAMPING = {"joint_damping": {"coefficients": {"pivot": "0.1 N m s/rad"}}}
+
+
+def test_the_true_scene_is_the_likeliest(damped_rod, damped_measurements):
+    found = [likelihood(damped_rod.scaled({PATH: s}).build(), damped_measurements) for s in (0.5, 1.0, 2.0)]
+    assert found[1].log > max(found[0].log, found[2].log)
+    assert found[1].nis == pytest.approx(1.0, abs=0.1)
+    assert found[1].rows == pytest.approx(6 * len(damped_measurements), rel=0.02)
+
+
+def test_a_measurement_that_is_refused_costs_as_much_wherever_it_is(free_rod, free_measurements):
+    scene = free_rod.build()
+    totals = []
+    for away in (1.0, 100.0):
+        index = len(free_measurements) // 2
+        outlier = replace(free_measurements[index], position=free_measurements[index].position + away)
+        totals.append(likelihood(scene, [*free_measurements[:index], outlier, *free_measurements[index + 1 :]]))
+    assert [each.refused for each in totals] == [1 + likelihood(scene, free_measurements).refused] * 2
+    assert totals[0].log == totals[1].log
+
+
+def test_no_likelihood_of_what_never_starts(free_rod, free_measurements):
+    assert likelihood(free_rod.build(), free_measurements[:1]) is None
+
+
+def test_what_is_there_is_kept(damped_rod, damped_measurements):
+    gravity, damping = ablate(damped_rod, damped_measurements)
+    assert gravity.keep
+    assert damping.keep
+    assert damping.delta_log_likelihood > 10.0 * damping.threshold  # TBD
+    assert damping.forecast_with < damping.forecast_without
+
+
+def test_what_was_missing_is_found_and_what_is_not_there_is_not(
+    free_rod, free_measurements, damped_measurements, tmp_path
+):
+    missing = ablate(free_rod, damped_measurements, [DAMPING])[-1]
+    absent = ablate(free_rod, free_measurements, [DAMPING])[-1]
+    assert missing.keep
+    assert missing.proposed
+    assert missing.fitted["effects.1.coefficients.pivot"] == pytest.approx(0.3, rel=0.05)  # TBD
+    assert not absent.keep
+    assert "drop, no evidence" in absent.evidence
+    draw([missing, absent], [], tmp_path / "picture.png")
+    assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
+
+
+def errors_of_fits(scene, seeds):
+    """Errors of the fitted damping in standard deviations, in the logarithm."""
+    out = []
+    for seed in seeds:
+        measurements = simulated_measurements(scene.build(), seed=seed, duration=2.0)
+        (found,) = fit(scene.scaled({PATH: 0.7}), [PATH], measurements).parameters
+        out.append(math.log(found.value / 0.3) / (math.log(found.high / found.low) / (2.0 * 1.96)))
+    return np.array(out)
+
+
+def test_a_fit_finds_the_truth(damped_rod):
+    assert np.abs(errors_of_fits(damped_rod, [0])).max() < 1.96  # 0.55
+
+
+@pytest.mark.slow
+def test_intervals_of_fits_are_as_wide_as_errors_are_large(damped_rod):
+    errors = errors_of_fits(damped_rod, range(16))
+    low, high = chi2.interval(0.95, 16)
+    assert low <= errors @ errors <= high  # 15.2 in [6.9, 28.8]
+
+
+def test_what_a_recording_cannot_tell_has_no_narrow_interval(damped_rod, damped_measurements):
+    found = fit(damped_rod, [PATH, "model.parts.rod.mass"], damped_measurements)  # only their ratio moves the rod
+    assert all(not each.high / each.low < 1.5 for each in found.parameters)
+
+
+def test_a_start_far_off_is_found_by_widening_the_noise(free_rod, free_measurements):
+    path = "effects.gravity.acceleration.2"
+    text = free_rod.without(0).added({"gravity": {"acceleration": [0, 0, -6.0]}})
+    found = fit(text, [path], free_measurements)
+    (gravity,) = found.parameters
+    assert gravity.low < -9.81 < gravity.high
+    assert np.isfinite(found.after)
+
+
+def test_a_bag_that_holds_nothing_usable_is_refused(free_rod):
+    with pytest.raises(RecordingError, match="/rod/pose"):
+        read_measurements(share_directory() / "bags" / "double_pendulum", free_rod.build())

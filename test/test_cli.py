@@ -307,6 +307,27 @@ def test_json_to_stdout_is_alone_there_and_as_documented(capsys, tmp_path, bag):
     assert again == figures
 
 
+def test_effects_tells_what_a_recording_calls_for(capsys, tmp_path, bag):
+    picture = tmp_path / "effects.png"
+    code, out, err = run(capsys, "effects", "pendulum", bag, "--plot", picture, "--json", "-")
+    assert (code, err) == (0, "")
+    (gravity,) = json.loads(out)["effects"]
+    assert gravity["name"] == "gravity"
+    assert gravity["keep"]
+    assert gravity["delta_log_likelihood"] > gravity["threshold"]
+    assert gravity["us_per_step"] is not None
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    code, out, _ = run(capsys, "effects", "pendulum", bag)
+    assert code == 0
+    assert "gravity: keep, +" in out
+    code, _, err = run(capsys, "effects", "pendulum", bag, "--fit", "effects.gravity.colour")
+    assert code == 2
+    assert "parameter 'effects.gravity.colour' is not there" in err
+    code, _, err = run(capsys, "effects", "pendulum", bag, "--try", "wind: {}")
+    assert code == 2
+    assert "'wind' is not an effect" in err
+
+
 def test_bench_prints_or_files_what_the_study_measured(capsys, monkeypatch, tmp_path):
     monkeypatch.setattr(bench, "ROUNDS", 2)
     code, out, err = run(capsys, "bench", "--json", tmp_path / "bench.json")

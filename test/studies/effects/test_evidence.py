@@ -21,7 +21,7 @@ DAMPING = {"joint_damping": {"coefficients": {"pivot": "0.1 N m s/rad"}}}
 def test_the_true_scene_is_the_likeliest(damped_rod, damped_measurements):
     found = [likelihood(damped_rod.scaled({PATH: s}).build(), damped_measurements) for s in (0.5, 1.0, 2.0)]
     assert found[1].log > max(found[0].log, found[2].log)
-    assert found[1].nis == pytest.approx(1.0, abs=0.1)
+    assert found[1].nis == pytest.approx(1.0, abs=0.1)  # 0.936 over 1200 rows, whose own deviation is 0.041
     assert found[1].rows == pytest.approx(6 * len(damped_measurements), rel=0.02)
 
 
@@ -44,7 +44,7 @@ def test_what_is_there_is_kept(damped_rod, damped_measurements):
     gravity, damping = ablate(damped_rod, damped_measurements)
     assert gravity.keep
     assert damping.keep
-    assert damping.delta_log_likelihood > 10.0 * damping.threshold  # TBD
+    assert damping.delta_log_likelihood > 100.0 * damping.threshold  # 491 of 3.5
     assert damping.forecast_with < damping.forecast_without
 
 
@@ -55,8 +55,8 @@ def test_what_was_missing_is_found_and_what_is_not_there_is_not(
     absent = ablate(free_rod, free_measurements, [DAMPING])[-1]
     assert missing.keep
     assert missing.proposed
-    assert missing.fitted["effects.1.coefficients.pivot"] == pytest.approx(0.3, rel=0.05)  # TBD
-    assert not absent.keep
+    assert missing.fitted["effects.1.coefficients.pivot"] == pytest.approx(0.3, rel=0.05)  # 0.308
+    assert not absent.keep  # 2.2 of 3.5
     assert "drop, no evidence" in absent.evidence
     draw([missing, absent], [], tmp_path / "picture.png")
     assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
@@ -85,6 +85,7 @@ def test_intervals_of_fits_are_as_wide_as_errors_are_large(damped_rod):
 
 def test_what_a_recording_cannot_tell_has_no_narrow_interval(damped_rod, damped_measurements):
     found = fit(damped_rod, [PATH, "model.parts.rod.mass"], damped_measurements)  # only their ratio moves the rod
+    # damping 0.04 to 2.4, mass 0.13 to 7.6
     assert all(not each.high / each.low < 1.5 for each in found.parameters)
 
 
@@ -93,7 +94,7 @@ def test_a_start_far_off_is_found_by_widening_the_noise(free_rod, free_measureme
     text = free_rod.without(0).added({"gravity": {"acceleration": [0, 0, -6.0]}})
     found = fit(text, [path], free_measurements)
     (gravity,) = found.parameters
-    assert gravity.low < -9.81 < gravity.high
+    assert gravity.low < -9.81 < gravity.high  # -9.92 to -9.73
     assert np.isfinite(found.after)
 
 

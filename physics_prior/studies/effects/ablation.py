@@ -107,7 +107,7 @@ def _best(
 ) -> tuple[SceneText, dict[str, float]]:
     """A scene with the numbers at some paths at their best, and these; as it stands if it cannot follow the recording."""
     if paths and likelihood(text.build(), measurements) is not None:
-        found = fit(text, paths, measurements, intervals=False)
+        found = fit(text, paths, measurements)
         text = found.scene
     return text, {path: text.number(path) for path in paths}
 

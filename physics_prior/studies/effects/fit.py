@@ -7,9 +7,9 @@ curvature of the likelihood at its maximum (the observed information): they hold
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from scipy.optimize import minimize
 from scipy.stats import norm
 
 from physics_prior.errors import SimulationError
@@ -18,11 +18,12 @@ from physics_prior.studies.effects.likelihood import likelihood
 from physics_prior.studies.effects.variant import SceneText
 
 WIDEST = math.log(1e3)  # a factor is sought between 1/1000 and 1000
-GAIN, ITERATIONS = 0.01, 30  # of log-likelihood by an iteration, below which a search ends, and how many it may take
-PROBE, FIRST_PROBE = 1e-3, 1e-2  # of the logarithm: steps of the gradient and of the first curvature
+FIRST_WIDTH, NARROWEST, WIDTH = 0.03, 1e-4, 0.3  # of the logarithm: differences at first, at least and at most
+FARTHEST, FLATTEST = 0.5, 1e-3  # steps of the logarithm at most; least curvature that counts, of unit diagonals
+GAIN, PASSES = 0.01, 15  # of log-likelihood, below which a search ends, and how many steps it may take
 CONFIDENCE = 0.95
 FAR, MOST_REFUSED = 1.5, 50  # NIS, and rows a refused measurement, beyond which a start is too far off for a search
-WIDENINGS = (16.0, 4.0, 1.0, 1.0)  # of all noise, from such a start: what fits nowhere has no slope to follow
+WIDENINGS = (16.0, 4.0, 1.0)  # of all noise, from such a start: what fits nowhere has no slope to follow
 IMPOSSIBLE = 1e12  # minus the log-likelihood of a motion that leaves the numbers
 
 
@@ -55,11 +56,8 @@ def fit(
     paths: Sequence[str],
     measurements: Sequence[Measurement],
     told: Callable[[int], None] = lambda count: None,
-    intervals: bool = True,
 ) -> Fit:
     """Fit the numbers at some paths of a scene to measurements; told is told how many replays were made.
-
-    Without intervals, which take some replays more, their ends are NaN.
 
     Raises:
         SceneError: a path leads to no number that can be scaled; SimulationError: no values follow the recording.
@@ -78,24 +76,15 @@ def fit(
     first = likelihood(scene.build(), measurements)
     before = math.nan if first is None else first.log
     near = first is not None and first.nis < FAR and first.refused * MOST_REFUSED <= first.rows
-    for widening in (1.0, 1.0) if near else WIDENINGS:
-        here = cost(best, widening)
-        found = minimize(
-            cost,
-            best,
-            (widening,),
-            method="L-BFGS-B",
-            bounds=[(-WIDEST, WIDEST)] * len(paths),
-            options={"eps": PROBE, "ftol": GAIN * widening / abs(here), "maxiter": ITERATIONS},
-        )
-        if found.fun < here:
-            best = found.x
+    widths = np.full(len(paths), FIRST_WIDTH)
+    for widening in (1.0,) if near else WIDENINGS:
+        best, widths, curvature = _climb(partial(cost, widening=widening), best, widths)
     lowest = cost(best)
     if lowest == IMPOSSIBLE:
         raise SimulationError(
             f"{scene.path}: no values of {list(paths)} were found with which it follows the recording"
         )
-    deviations = _deviations(cost, best, lowest) if intervals else np.full(len(best), math.inf)
+    deviations = _deviations(curvature)
     z = float(norm.ppf(0.5 + 0.5 * CONFIDENCE))
     parameters = []
     for path, number, logarithm, deviation in zip(paths, start, best, deviations, strict=True):
@@ -112,25 +101,54 @@ def _changed(scene: SceneText, paths: Sequence[str], logarithms: np.ndarray) -> 
     return scene.scaled({path: math.exp(each) for path, each in zip(paths, logarithms, strict=True)})
 
 
-def _deviations(cost: Callable[[np.ndarray], float], x: np.ndarray, lowest: float) -> np.ndarray:
-    """(k,) standard deviations from the curvature at x (k,); infinite where it has no minimum there.
+def _climb(
+    cost: Callable[[np.ndarray], float], x: np.ndarray, widths: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Newton's method from x (k,): where the cost is least, a deviation of each number there, and the curvature (k, k).
 
-    Central differences, the second time as wide as the first says that a deviation is: below that a likelihood has the
-    roughness of its gate.
+    Differences are central and as wide as a deviation (widths, from the pass before): narrower, they would meet the
+    roughness of the gate, and of one side only, they would shift the minimum by half their width.
     """
-    k, widths = len(x), np.full(len(x), FIRST_PROBE)
-    for last in (False, True):
-        curvature = np.zeros((k, k))
-        ends = [(cost(x + step), cost(x - step)) for step in np.diag(widths)]
-        for i in range(k):
-            curvature[i, i] = (sum(ends[i]) - 2.0 * lowest) / widths[i] ** 2
-            for j in range(i if last else 0):
-                step = np.zeros(k)
-                step[[i, j]] = widths[[i, j]]
-                mixed = cost(x + step) + cost(x - step) + 2.0 * lowest - sum(ends[i]) - sum(ends[j])
-                curvature[i, j] = curvature[j, i] = 0.5 * mixed / (widths[i] * widths[j])
-        diagonal = np.diag(curvature)
-        widths = np.clip(1.0 / np.sqrt(np.maximum(diagonal, 1e-6)), PROBE, 0.5)
+    here = cost(x)
+    for _ in range(PASSES):
+        gradient, curvature = _slopes(cost, x, here, widths)
+        curved = np.diag(curvature)
+        widths = np.clip(1.0 / np.sqrt(np.maximum(curved, 1e-6)), NARROWEST, WIDTH)
+        scale = np.sqrt(np.maximum(np.abs(curved), 1e-6))  # of a unit curvature, in which directions are alike
+        values, vectors = np.linalg.eigh(curvature / np.outer(scale, scale))
+        downhill = vectors.T @ (gradient / scale) / np.maximum(np.abs(values), FLATTEST)
+        step = -(vectors @ downhill) / scale
+        step *= min(1.0, FARTHEST / max(float(np.max(np.abs(step))), 1e-300))
+        if -0.5 * float(gradient @ step) < GAIN:
+            break
+        there = cost(x + step)
+        while there >= here and float(np.max(np.abs(step))) > NARROWEST:
+            step *= 0.5
+            there = cost(x + step)
+        if there >= here:
+            break
+        x, here = np.clip(x + step, -WIDEST, WIDEST), there
+    return x, widths, curvature
+
+
+def _slopes(
+    cost: Callable[[np.ndarray], float], x: np.ndarray, here: float, widths: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient (k,) and curvature (k, k) of the cost at x by central differences."""
+    steps = np.diag(widths)
+    ends = [(cost(x + step), cost(x - step)) for step in steps]
+    gradient = np.array([ahead - behind for ahead, behind in ends]) / (2.0 * widths)
+    curvature = np.diag([ahead + behind - 2.0 * here for ahead, behind in ends] / widths**2)
+    for i in range(len(x)):
+        for j in range(i):
+            both = steps[i] + steps[j]
+            mixed = cost(x + both) + cost(x - both) + 2.0 * here - sum(ends[i]) - sum(ends[j])
+            curvature[i, j] = curvature[j, i] = 0.5 * mixed / (widths[i] * widths[j])
+    return gradient, curvature
+
+
+def _deviations(curvature: np.ndarray) -> np.ndarray:
+    """(k,) standard deviations that a curvature (k, k) means; infinite where it is not that of a minimum."""
     if not np.isfinite(curvature).all() or np.min(np.linalg.eigvalsh(curvature)) <= 0.0:
-        return np.full(k, math.inf)
+        return np.full(len(curvature), math.inf)
     return np.asarray(np.sqrt(np.diag(np.linalg.inv(curvature))))

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from physics_prior.dynamics.projection import FARTHEST
 from physics_prior.effects.holding import Holding
 from physics_prior.errors import SimulationError
 
@@ -16,6 +15,9 @@ ASSEMBLED = 1e-10  # m: what may be left
 NEAR = 1e-6  # m: from here on, projection does the rest
 STEPS = 100
 SHORTEST = 1e-6  # of a Newton step
+LONGEST = (
+    1e3  # rad or m of a freedom in one step: so far out that rounding closes whatever is open, nothing is put together
+)
 GAIN = 0.1  # share of what a step promises that it must keep
 LARGEST_TURN = 0.5  # rad in one step
 
@@ -68,7 +70,6 @@ def _descend(simulator: "Simulator", q: np.ndarray) -> float:
         A, _ = simulator.tangent_rows(q, still)
         responses = _responses(simulator, q, A)
         step = -responses @ _pseudo_solve(A @ responses, error)
-        step *= min(1.0, FARTHEST / max(float(np.max(np.abs(step))), FARTHEST))
         tried, length = _search(simulator, q, step, size)
         if length == 0.0:
             break
@@ -79,11 +80,13 @@ def _descend(simulator: "Simulator", q: np.ndarray) -> float:
 
 def _search(simulator: "Simulator", q: np.ndarray, step: np.ndarray, size: float) -> tuple[np.ndarray, float]:
     """The configuration that much of a step leads to which makes the error, of that size, smaller; and how much of it."""
-    length = 1.0
+    length, longest = 1.0, LONGEST / max(float(np.max(np.abs(step))), 1.0)
     while length > SHORTEST:
-        tried = simulator.displaced(q, length * step)
-        if np.linalg.norm(simulator.constraint_error(tried, np.zeros(simulator.nv))) <= (1.0 - GAIN * length) * size:
-            return tried, length
+        if length <= longest:
+            tried = simulator.displaced(q, length * step)
+            left = np.linalg.norm(simulator.constraint_error(tried, np.zeros(simulator.nv)))
+            if left <= (1.0 - GAIN * length) * size:
+                return tried, length
         length *= 0.5
     return q, 0.0
 

@@ -73,14 +73,14 @@ def errors_of_fits(scene, seeds):
 
 
 def test_a_fit_finds_the_truth(damped_rod):
-    assert np.abs(errors_of_fits(damped_rod, [0])).max() < 1.96  # 0.55
+    assert np.abs(errors_of_fits(damped_rod, [0])).max() < 1.96  # 0.59
 
 
 @pytest.mark.slow
 def test_intervals_of_fits_are_as_wide_as_errors_are_large(damped_rod):
     errors = errors_of_fits(damped_rod, range(16))
     low, high = chi2.interval(0.95, 16)
-    assert low <= errors @ errors <= high  # 15.2 in [6.9, 28.8]
+    assert low <= errors @ errors <= high  # 19.0 in [6.9, 28.8]
 
 
 def test_what_a_recording_cannot_tell_has_no_narrow_interval(damped_rod, damped_measurements):

@@ -54,6 +54,8 @@ class Joint:
         position: (3,) m, child origin in the parent frame at zero.
         orientation: (4,) quaternion, child axes to parent frame at zero.
         axis: (3,) unit vector in the child frame; of use to revolute and prismatic joints only.
+        range: lower and upper end, rad or m, that such a joint is known to have, for those who draw or export it. It stops
+            nothing: effects do.
 
     Raises:
         ModelError: a zero or non-finite axis, quaternion or position; a free joint that is not on the world or is given a
@@ -67,6 +69,7 @@ class Joint:
     position: np.ndarray = field(default_factory=lambda: np.zeros(3))
     orientation: np.ndarray = field(default_factory=lambda: np.array([1.0, 0.0, 0.0, 0.0]))
     axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    range: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         position = np.asarray(self.position, dtype=float)

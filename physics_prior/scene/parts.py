@@ -10,9 +10,11 @@ from physics_prior import inertia, rotations
 from physics_prior.errors import ModelError
 from physics_prior.inertia import MassProperties
 from physics_prior.model import Joint, JointKind, Part, Shape, Tree
+from physics_prior.model.human import Human
 from physics_prior.model.urdf import MAXIMUM_CHARACTERS, tree_from_urdf
 from physics_prior.scene.quantity import parse_quantity
 from physics_prior.scene.schema import (
+    HumanSection,
     JointSection,
     ModelSection,
     Orientation,
@@ -126,6 +128,8 @@ def build_tree(place: Place) -> Tree:
     section = validate(ModelSection, place)
     if section.urdf is not None:
         return _tree_from_file(place["urdf"], section)
+    if section.human is not None:
+        return _tree_of_human(place["human"])
     entries = place["parts"].items()
     names = [name for name, _ in entries]
     parts, joints = [], []
@@ -146,6 +150,14 @@ def build_tree(place: Place) -> Tree:
     if tree.nv == 0:
         raise place["parts"].error("nothing moves: give at least one part a joint that is not fixed")
     return tree
+
+
+def _tree_of_human(place: Place) -> Tree:
+    section = validate(HumanSection, place)
+    try:
+        return Human(section.mass, section.height, section.sex, section.table, section.lengths, section.rigid).tree()
+    except ModelError as error:
+        raise relocate(place, error, []) from None
 
 
 def _tree_from_file(place: Place, section: ModelSection) -> Tree:

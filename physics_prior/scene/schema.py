@@ -138,17 +138,29 @@ class PartSection(Section):
     joint: JointSection
 
 
+class HumanSection(Section):
+    """A person: what ``model.human.Human`` takes, which checks it."""
+
+    mass: Annotated[float, quantity("kg")]
+    height: Length
+    sex: Literal["female", "male"]
+    table: Literal["de_leva", "dumas"] = "de_leva"
+    lengths: dict[str, Length] = Field(default={})
+    rigid: tuple[str, ...] = ()
+
+
 class ModelSection(Section):
-    """The model: parts by name, or a URDF file relative to the scene's and how its root stands."""
+    """The model: parts by name, a person, or a URDF file relative to the scene's and how its root stands."""
 
     parts: JsonValue = None
+    human: JsonValue = None
     urdf: str | None = None
     root: Literal["fixed", "free"] = "fixed"
 
     @model_validator(mode="after")
     def _check_one(self) -> "ModelSection":
-        if (self.parts is None) == (self.urdf is None):
-            raise ValueError("give either 'parts' or 'urdf'")
+        if sum(each is not None for each in (self.parts, self.human, self.urdf)) != 1:
+            raise ValueError("give one of 'parts', 'human' and 'urdf'")
         return self
 
 

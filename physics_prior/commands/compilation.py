@@ -13,7 +13,7 @@ DURATION, WITH_CONTACT = "~15 s", "~40 s"
 
 
 @contextmanager
-def compiling(scene: Scene, last: Literal["advance", "linearise"]) -> Iterator[None]:
+def compiling(scene: Scene, last: Literal["advance", "carry"]) -> Iterator[None]:
     """Say what is going on while the block makes the first use of a scene's step; last: what it compiles last of that."""
     constrained, touching = kinds_of_rows(scene.tree, scene.effects)
     step = step_module(scene.effects, constrained, scene.step.integrator, touching)

@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     scene = text.build()
     if not scene.measurements:
         raise PhysicsPriorError(f"scene '{scene.name}' measures nothing: add 'measurements' to study its effects")
-    with compiling(scene, "linearise"):
+    with compiling(scene, "carry"):
         warm_up(scene)
     if args.bag is None:
         measurements = simulated_measurements(scene, args.seed, SIMULATED_SECONDS)

@@ -35,7 +35,7 @@ ROUNDS, STEPS, LINEARISATIONS = 15, 100, 10  # of timing: medians over rounds
 
 def explain(scene: Scene) -> None:
     """Print everything about a scene; compiles its step where it is not yet."""
-    with compiling(scene, "linearise"):
+    with compiling(scene, "carry"):
         simulator = scene.simulator()
         state = _state(scene, simulator)
     out = console()

@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
 
         require_format(Path(args.plot))
     scene = load_scene(args.scene)
-    with compiling(scene, "linearise"):
+    with compiling(scene, "carry"):
         warm_up(scene)
     with progress(f"replaying {args.bag.name}") as report:
         result = replay(

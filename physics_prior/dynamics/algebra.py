@@ -105,6 +105,12 @@ def transposed_times(m: Matrix, u: Vector) -> Vector:
 
 
 @inline_kernel
+def transposed(m: Matrix) -> Matrix:
+    """The matrix m^T."""
+    return m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]
+
+
+@inline_kernel
 def symmetric_times(m: Symmetric, u: Vector) -> Vector:
     """The product m u of a symmetric matrix (6-tuple) and a vector."""
     return (

@@ -233,16 +233,15 @@ def settle_columns(memory: Array, tangent: Array, q: Array, v: Array, F: Array, 
 def spread_noise(memory: Array, tangent: Array, force_noise: Array, h: float, G: Array) -> None:
     """Fill G (2 nv, 2 nv) from white generalized forces over a step of h seconds; needs ``differentiate`` at its beginning.
 
-    G G^T = integral of B B^T with B = M^-1 force_noise: the double integrator's exact second moments.
+    Columns of force_noise (nv, nv) are independent ones. G G^T = integral of B B^T with B = M^-1 force_noise: the double
+    integrator's exact second moments.
     """
     links, _, _, rows, _, _, _, _ = sections(memory)
     m, nv = row_count(rows), force_noise.shape[0]
     _, matrices, scratch, freedoms, _, _, stages = tangent_sections(tangent, links.shape[0], m, nv)
-    columns, M = stages[0], matrices[0:nv]
-    clear(columns)
+    columns, M = stages[0].reshape(-1)[: nv * nv].reshape(nv, nv), matrices[0:nv]
     near, far, late = h * math.sqrt(h / 3.0), 0.5 * math.sqrt(3.0 * h), 0.5 * math.sqrt(h)
-    for k in range(nv):
-        columns[k, k] = force_noise[k]
+    copy(force_noise, columns)
     solve_mass(freedoms, M, columns)
     clear(G)
     for k in range(nv):

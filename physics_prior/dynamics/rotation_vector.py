@@ -94,3 +94,25 @@ def logarithm(w: float, x: float, y: float, z: float) -> Vector:
         return sign * 2.0 * x, sign * 2.0 * y, sign * 2.0 * z
     s = sign * 2.0 * math.atan2(size, sign * w) / size
     return s * x, s * y, s * z
+
+
+@inline_kernel
+def vector_of(R: Matrix) -> Vector:
+    """The rotation vector, at most half a turn, of a rotation matrix.
+
+    By the row of 4 q q^T with the largest diagonal, which is never small (Shepperd's method).
+    """
+    trace = R[0] + R[4] + R[8]
+    largest = max(trace, R[0], R[4], R[8])
+    a, b, c = R[7] - R[5], R[2] - R[6], R[3] - R[1]
+    d, e, f = R[1] + R[3], R[2] + R[6], R[5] + R[7]
+    if largest == trace:
+        w, x, y, z = 1.0 + trace, a, b, c
+    elif largest == R[0]:
+        w, x, y, z = a, 1.0 + 2.0 * R[0] - trace, d, e
+    elif largest == R[4]:
+        w, x, y, z = b, d, 1.0 + 2.0 * R[4] - trace, f
+    else:
+        w, x, y, z = c, e, f, 1.0 + 2.0 * R[8] - trace
+    size = math.sqrt(w * w + x * x + y * y + z * z)
+    return logarithm(w / size, x / size, y / size, z / size)

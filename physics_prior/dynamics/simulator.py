@@ -1,6 +1,7 @@
 """A model and its effects, compiled: the one object that moves a body, differentiates its motion and tells its forces."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from physics_prior.dynamics.contact import impulse
 from physics_prior.dynamics.contact.memory import candidates_in, contact_memory, residual_in
 from physics_prior.dynamics.contact.reactions import candidates_by_name, reaction
 from physics_prior.dynamics.contact.records import candidate_records
+from physics_prior.dynamics.covariance import carry_step
 from physics_prior.dynamics.inertia_check import check_inertia
 from physics_prior.dynamics.integrators import DEFAULT, INTEGRATORS, TOLERATED, IntegratorName
 from physics_prior.dynamics.memory import OPEN, SPARE, TIME, TOLERANCE, Memory, correction_size, tangent_size
@@ -79,7 +81,8 @@ class Simulator:
         records, parameters = pair_records(tree, pairs), pack_parameters(tree, effects)
         tables = motion_tables(tree, pairs, records, len(parameters))
         needs = INTEGRATORS[integrator]
-        self._tangent_size = tangent_size(len(tree.links), self.rows, self.nv, needs.stages)
+        own_size = tangent_size(len(tree.links), self.rows, self.nv, needs.stages)
+        self._tangent_size = own_size + 2 * (2 * self.nv) ** 2  # F and G of a step
         width = moved_freedoms(tree, records, candidates)
         memory = Memory(
             link_records(tree, records, candidates),
@@ -89,7 +92,7 @@ class Simulator:
             self.nq,
             self.nv,
             SPARE + needs.vectors,
-            self._tangent_size if needs.implicit else 0,
+            own_size if needs.implicit else 0,
             contact_memory(candidates, self.rows, width, self.nq) if len(candidates) else None,
         )
         memory.array[TOLERANCE] = tolerance
@@ -99,7 +102,7 @@ class Simulator:
         self._gravity = memory.parameters[:GRAVITY]
         self.step = step_module(effects, bool(pairs), integrator, len(candidates) > 0)
         self._rotations, self._origins = self._work["rotation"].reshape(-1, 3, 3), self._work["origin"]
-        self._frames: dict[str, tuple[int, np.ndarray, np.ndarray]] = {}
+        self._frames: dict[Any, tuple[int, np.ndarray, np.ndarray]] = {}
         self._still, self._vdot = np.zeros(self.nv), np.zeros(self.nv)
         self._tangent = np.zeros(0)
         self._stores = any(effect.compiled is not None and effect.compiled.energy is not None for effect in effects)
@@ -134,7 +137,7 @@ class Simulator:
                 large for it).
         """
         extra = self._still if tau is None else tau
-        self.rank = self._moved(self.step.advance(self.memory.array, q, v, extra, h, count), h)
+        self.moved(self.step.advance(self.memory.array, q, v, extra, h, count), h)
 
     def linearise(
         self, q: np.ndarray, v: np.ndarray, h: float, force_noise: np.ndarray
@@ -142,17 +145,15 @@ class Simulator:
         """Move q and v in place by one step as ``advance`` does; return F and G, (2 nv, 2 nv) each.
 
         F is the derivative of the new error state (tangent of q, v) by the old. G G^T is the covariance that white
-        generalized forces of density force_noise (nv,) [N sqrt(s) or N m sqrt(s)] add. Both lie in the tangent space of the
-        constraints.
+        generalized forces of density force_noise (nv,) [N sqrt(s) or N m sqrt(s)] add, or those that the columns of one
+        (nv, nv) make. Both lie in the tangent space of the constraints.
 
         Raises:
-            SimulationError: an integrator found no solution, or what holds came apart.
+            SimulationError: as of ``advance``.
         """
-        F, G = np.empty((2 * self.nv, 2 * self.nv)), np.empty((2 * self.nv, 2 * self.nv))
-        rank = self.step.linearise(self.memory.array, self.tangent_array(), q, v, self._still, h, force_noise, F, G)
-        open_now = rank >= 0 and self.memory.array[OPEN] > projection.APART
-        self.rank = self._moved(-3 if open_now else rank, h)
-        return F, G
+        noise = np.diag(force_noise) if force_noise.ndim == 1 else force_noise
+        W = carry_step(self, q, v, h, np.eye(2 * self.nv), noise)
+        return W[:, : 2 * self.nv], W[:, 2 * self.nv :]
 
     def project(self, q: np.ndarray, v: np.ndarray) -> float:
         """Put q and v onto the constraints in place, in the mass metric; return the position error left, m."""
@@ -191,7 +192,10 @@ class Simulator:
         if self.rows:
             self.project(q, v)
             scratch = np.empty(correction_size(self.rows, self.nv, factor.shape[1]))
-            self.step.project_columns(self.memory.array, *self.tangent_rows(q, v), factor, scratch, True)
+            columns = np.ascontiguousarray(factor)
+            self.step.project_columns(self.memory.array, *self.tangent_rows(q, v), columns, scratch, True)
+            if columns is not factor:
+                factor[:] = columns
 
     def tangent_rows(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Constraint Jacobian A (rows, nv) and the derivative of A v by the tangent of q (rows, nv)."""
@@ -217,7 +221,7 @@ class Simulator:
 
     def pose(self, part: str) -> tuple[np.ndarray, np.ndarray]:
         """Position (3,) m and rotation matrix (3, 3), part to world, of a part's frame; needs ``move``."""
-        link, position, own = self._frame(part)
+        link, position, own = self.frame(part)
         if link < 0:
             return position.copy(), own.copy()
         R = self._rotations[link]
@@ -225,7 +229,7 @@ class Simulator:
 
     def velocity(self, part: str) -> tuple[np.ndarray, np.ndarray]:
         """Linear and angular velocity, (3,) m/s and (3,) rad/s, world axes, of a part's frame; needs ``move``."""
-        link, position, _ = self._frame(part)
+        link, position, _ = self.frame(part)
         if link < 0:
             return np.zeros(3), np.zeros(3)
         here = self._work[link]
@@ -233,7 +237,7 @@ class Simulator:
 
     def jacobian(self, part: str, point: np.ndarray) -> np.ndarray:
         """(6, nv): angular velocity of a part and velocity of a point in its frame (3,), world axes, per v; needs ``move``."""
-        link, position, own = self._frame(part)
+        link, position, own = self.frame(part)
         out = np.zeros((6, self.nv))
         kinematics.point_jacobian(self._links, self._work, link, position + own @ point, out)
         return out
@@ -260,13 +264,24 @@ class Simulator:
         stored = self.step.potential(self.memory.array, self._posed) if self._stores else 0.0
         return float(kinematics.energy(self._links, self._work, self._gravity) + stored)
 
-    def _frame(self, part: str) -> tuple[int, np.ndarray, np.ndarray]:
-        """Link, position and rotation on it of a part; ModelError lists the known parts."""
-        if part not in self._frames:
-            frame = self.tree.frame(part)
-            R = rotations.matrix_from_quaternion(frame.orientation)
-            self._frames[part] = (frame.link, frame.position, R)
-        return self._frames[part]
+    def frame(
+        self,
+        part: str,
+        position: Sequence[float] = (0.0, 0.0, 0.0),
+        orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+    ) -> tuple[int, np.ndarray, np.ndarray]:
+        """Link (-1 the world), position (3,) m and rotation matrix (3, 3) on it, of a frame placed so in a part's.
+
+        Raises:
+            ModelError: an unknown part.
+        """
+        key = (part, tuple(position), tuple(orientation))
+        if key not in self._frames:
+            own = self.tree.frame(part)
+            R = rotations.matrix_from_quaternion(own.orientation)
+            place = own.position + R @ np.array(position)
+            self._frames[key] = (own.link, place, R @ rotations.matrix_from_quaternion(np.array(orientation)))
+        return self._frames[key]
 
     def wrench_array(self, q: np.ndarray, v: np.ndarray, vdot: np.ndarray | None = None) -> np.ndarray:
         """(len(wrench_names), 6): force and moment ON a part BY each joint and constraint effect, world axes.
@@ -341,8 +356,9 @@ class Simulator:
             self._tangent = np.zeros(self._tangent_size)
         return self._tangent
 
-    def _moved(self, rank: int, h: float) -> int:
-        """The rank that a step returned, refused where it is negative."""
+    def moved(self, rank: int, h: float) -> None:
+        """Take in what a step of h seconds returned: its rank, or SimulationError where that is negative."""
+        self.rank = rank
         if rank == -1:
             raise SimulationError(
                 f"the motion is not finite after a step of {h:g} s: a smaller step size or another integrator may do"
@@ -356,7 +372,6 @@ class Simulator:
             raise SimulationError(
                 f"the integrator '{self.integrator}' found no solution of a step of {h:g} s: a smaller step size may do"
             )
-        return rank
 
     def _move_anchors(self) -> None:
         """Bring moving anchors to the present time."""

@@ -1,16 +1,18 @@
-"""The step of a scene, compiled: advance and linearise, by the integrator that the scene names.
+"""The step of a scene, compiled: advance, and carry with a covariance, by the integrator that the scene names.
 
 The composer (dynamics/compose.py) writes it as one module: the scene's equation of motion (motion.py), its integrator
 (integrators/), the events of contact where there is any (contact/events.py), and this. ``memory`` is that of memory.py; its
-seventh number is the time, s. ``linearise`` is the integrator's own, or that of the events: a function around it would be
-optimised once more, for seconds.
+seventh number is the time, s. ``linearise`` is the integrator's own, or that of the events.
 """
 
 import math
 
+from physics_prior.dynamics.arrays import copy
+from physics_prior.dynamics.constraint import row_count
+from physics_prior.dynamics.covariance import carry_factor, triangularise
 from physics_prior.dynamics.integrators.rk4 import linearise_smooth, smooth_step
 from physics_prior.dynamics.kernel import kernel
-from physics_prior.dynamics.memory import OPEN
+from physics_prior.dynamics.memory import OPEN, SPARE, sections, tangent_sections
 from physics_prior.dynamics.projection import APART
 from physics_prior.dynamics.types import Array
 
@@ -31,9 +33,54 @@ def advance(memory: Array, q: Array, v: Array, extra: Array, h: float, count: in
             return rank
         if memory[OPEN] > APART:
             return -3
-    total = 0.0  # squares, because an energy has to be finite too
-    for k in range(v.shape[0]):
-        total += v[k] * v[k]
-    for k in range(q.shape[0]):
-        total += q[k] * q[k]
-    return rank if math.isfinite(total) else -1
+    return rank if _finite(q) and _finite(v) else -1
+
+
+@kernel
+def carry(
+    memory: Array,
+    tangent: Array,
+    q: Array,
+    v: Array,
+    extra: Array,
+    h: float,
+    count: int,
+    force_noise: Array,
+    U: Array,
+    T: Array,
+    reduced: bool,
+) -> int:
+    """Move q (nq,) and v (nv,) as ``advance`` does, and the factor U (2 nv, 2 nv) of their errors; return as it does.
+
+    force_noise (nv, nv): a factor of the density of white generalized forces. T (4 nv, 2 nv) is left as the last step's U F^T
+    above G^T; or, if reduced, U as their triangular factor and T as scratch.
+    """
+    links, _, _, rows, _, _, spare, _ = sections(memory)
+    nv, rank, total = v.shape[0], 0, 0.0
+    n, scratch = 2 * nv, spare[SPARE - 6 : SPARE].reshape(-1)
+    stages = tangent_sections(tangent, links.shape[0], row_count(rows), nv)[6]
+    last = stages.shape[0]
+    F, G = stages[last - 4 : last - 2].reshape(n, n), stages[last - 2 : last].reshape(n, n)
+    for index in range(count):
+        rank = linearise(memory, tangent, q, v, extra, h, force_noise, F, G)
+        if rank < 0:
+            return rank
+        if memory[OPEN] > APART:
+            return -3
+        carry_factor(F, G, U, T)
+        if reduced or index < count - 1:
+            triangularise(T, n, scratch)
+            copy(T[:n], U)
+    if reduced:
+        for k in range(n):
+            total += U[k, k]  # a reflection takes what is not finite in a row to the diagonal
+    return rank if math.isfinite(total) and _finite(q) and _finite(v) else -1
+
+
+@kernel
+def _finite(numbers: Array) -> bool:
+    """Whether numbers are finite, and their squares: an energy has to be, too."""
+    total = 0.0
+    for k in range(numbers.shape[0]):
+        total += numbers[k] * numbers[k]
+    return math.isfinite(total)

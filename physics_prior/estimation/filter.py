@@ -12,12 +12,12 @@ from scipy.stats import chi2
 from physics_prior.dynamics.contact.impulse import push_out
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.dynamics.switches import Hold
-from physics_prior.errors import MeasurementError, SimulationError
+from physics_prior.errors import MeasurementError
 from physics_prior.estimation import switching
 from physics_prior.estimation.measurement import ForceMeasurement, Measurement, SwitchCommand, command_topic
 from physics_prior.estimation.observation import Innovation, check, innovation
 from physics_prior.estimation.process import Process, State, steps
-from physics_prior.estimation.square_root import innovate, predicted_factor
+from physics_prior.estimation.square_root import innovate
 from physics_prior.scene import MeasurementSource, Scene
 
 ITERATIONS = 5  # of the update, where one linearisation does not do
@@ -31,7 +31,7 @@ class Posterior:
     Attributes:
         stamp: ns.
         state: the best state.
-        factor: (n, n) factor S of its covariance S S^T; lower, but for what constraints do to it.
+        factor: (n, n) factor S of its covariance S S^T: lower after a prediction, any after an update.
         accepted: stamp of the last measurement that was believed, ns.
         refused: how many the gate has refused since.
         used: whether the last one was believed; None where it said nothing or did not fit.
@@ -89,13 +89,8 @@ class Filter:
         """``predict`` where nothing switches on the way."""
         self.enter(posterior)
         count, h = steps((stamp - posterior.stamp) * 1e-9, self.scene.step.size)
-        state, factor = posterior.state.copy(), posterior.factor.copy()
-        for _ in range(count):
-            factor = predicted_factor(self.process.carry(state, factor, h))
-        if not all(np.isfinite(array).all() for array in (state.q, state.v, state.acceleration, factor)):
-            raise SimulationError(
-                f"the prediction is not finite after steps of {h:g} s: a smaller step size or the other integrator may do"
-            )
+        state = posterior.state.copy()
+        factor = self.process.predict(state, posterior.factor, h, count)
         return replace(self._fresh(posterior), stamp=stamp, state=state, factor=factor)
 
     @staticmethod
@@ -141,42 +136,45 @@ class Filter:
 
         Iterated (Gauss-Newton, Bell and Cathey 1993) where the correction is too large for one linearisation.
         """
-        prior = self._fresh(prior)
         if not self.observes(measurement):
             active = [hold.active for hold in prior.holds]
-            return switching.switch(self, prior, *switching.decision(self, measurement, active))
+            return switching.switch(self, self._fresh(prior), *switching.decision(self, measurement, active))
         self.enter(prior)
         seen = self.innovation(measurement, prior.state)
         m, n = len(seen.y), len(prior.factor)
         if m == 0:
-            return prior
-        W, whitened = np.empty((m + n, m + n)), np.empty(m)
-        nis = innovate(prior.factor, seen.H, seen.noise, W, whitened, seen.y)
-        prior = replace(prior, nis=nis, dimension=m, log_determinant=2.0 * float(np.sum(np.log(np.diag(W)[:m]))))
+            return self._fresh(prior)
+        U, T = np.ascontiguousarray(prior.factor.T), np.empty((m + n, m + n))
+        scratch, correction = np.empty(2 * (m + n)), np.empty(n)
+        nis, determinant, largest = innovate(U, seen.H, seen.noise, seen.y, T, scratch, correction)
         if gated and not nis <= self.gate_limit(m):
-            return replace(prior, refused=prior.refused + 1, used=False)
-        correction = W[m:, :m] @ whitened
+            refused = prior.refused + 1
+            return replace(
+                prior, nis=nis, dimension=m, log_determinant=determinant, refused=refused, used=False, start=False
+            )
         state = self.process.displace(prior.state, correction)
-        for _ in range(ITERATIONS - 1):
-            if np.max(np.abs(correction[: self.simulator.nv])) < SMALL_CORRECTION:
-                break
+        for _ in range(ITERATIONS - 1 if largest >= SMALL_CORRECTION else 0):
             seen = self.innovation(measurement, state)
             from_prior = self.process.difference(prior.state, state)
-            innovate(prior.factor, seen.H, seen.noise, W, whitened, seen.y + seen.H @ from_prior[: seen.H.shape[1]])
-            change = W[m:, :m] @ whitened - from_prior
-            state = self.process.displace(prior.state, from_prior + change)
-            if np.max(np.abs(change)) < 1e-3 * SMALL_CORRECTION:
+            y = seen.y + seen.H @ from_prior[: seen.H.shape[1]]
+            innovate(U, seen.H, seen.noise, y, T, scratch, correction)
+            state = self.process.displace(prior.state, correction)
+            if np.max(np.abs(correction - from_prior)) < 1e-3 * SMALL_CORRECTION:
                 break
-        factor = np.ascontiguousarray(W[m:, m:])
+        factor = np.array(T[m:, m:]).T
         self.constrain(state, factor)
-        return replace(
-            prior,
-            state=state,
-            factor=factor,
+        return Posterior(
+            prior.stamp,
+            state,
+            factor,
             accepted=prior.stamp,
-            refused=0,
             used=True,
+            nis=nis,
+            dimension=m,
+            log_determinant=determinant,
+            begun=prior.begun,
             holds=self.simulator.switches.holds,
+            trouble=prior.trouble,
         )
 
     @property

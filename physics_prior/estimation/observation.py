@@ -1,11 +1,28 @@
 """Observation models: what a state lets a source see, how that depends on the state, and how noisy it is."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
-from physics_prior import rotations
+from physics_prior.dynamics.algebra import (
+    get3,
+    get9,
+    minus,
+    plus,
+    product,
+    put3,
+    rotation_of,
+    times,
+    transposed,
+    transposed_times,
+)
+from physics_prior.dynamics.arrays import copy
+from physics_prior.dynamics.kernel import kernel
+from physics_prior.dynamics.kinematics import point_jacobian
+from physics_prior.dynamics.rotation_vector import vector_of
 from physics_prior.dynamics.simulator import Simulator
+from physics_prior.dynamics.types import Array, Records
 from physics_prior.errors import MeasurementError
 from physics_prior.estimation.measurement import (
     ForceMeasurement,
@@ -74,34 +91,24 @@ def innovation(source: MeasurementSource, measurement: Measurement, simulator: S
     axes (Sola 2017, ch. 4). m may be 0, where no marker is seen. The measurement must fit its source (``check``).
     """
     if isinstance(source, PoseSource) and isinstance(measurement, PoseMeasurement):
-        position, R, jacobian = _frame(simulator, source)
-        turn = rotations.log(
-            rotations.quaternion_from_matrix(R.T @ rotations.matrix_from_quaternion(measurement.orientation))
-        )
-        y = np.concatenate([source.scale * measurement.position - position, turn])
-        H = np.concatenate([jacobian[3:], R.T @ jacobian[:3]])
+        y, H = _frame_seen(simulator, source, source.scale * measurement.position, measurement.orientation)
         if measurement.covariance is not None:
             to_metres = np.repeat([source.scale, 1.0], 3)
             return Innovation(y, H, to_metres[:, None] * np.linalg.cholesky(measurement.covariance))
-        return Innovation(y, H, np.diag([source.position_noise] * 3 + [source.orientation_noise] * 3))
+        return Innovation(y, H, _alike(3, source.position_noise, source.orientation_noise))
     if isinstance(source, OrientationSource) and isinstance(measurement, OrientationMeasurement):
-        _, R, jacobian = _frame(simulator, source)
-        y = rotations.log(
-            rotations.quaternion_from_matrix(R.T @ rotations.matrix_from_quaternion(measurement.orientation))
-        )
+        y, H = _frame_seen(simulator, source, NOWHERE, measurement.orientation)
         if measurement.covariance is not None:
-            return Innovation(y, R.T @ jacobian[:3], np.linalg.cholesky(measurement.covariance))
-        return Innovation(y, R.T @ jacobian[:3], source.orientation_noise * np.eye(3))
+            return Innovation(y[3:], H[3:], np.linalg.cholesky(measurement.covariance))
+        return Innovation(y[3:], H[3:], _alike(3, source.orientation_noise))
     if isinstance(source, PointsSource) and isinstance(measurement, PointsMeasurement):
         seen = np.flatnonzero(~np.isnan(measurement.points).any(axis=1))
-        y, H = np.zeros(3 * len(seen)), np.zeros((3 * len(seen), simulator.nv))
-        for row, index in enumerate(seen):
-            marker = source.markers[index]
-            position, R = simulator.pose(marker.part)
-            point = np.array(marker.point)
-            y[3 * row : 3 * row + 3] = measurement.points[index] - position - R @ point
-            H[3 * row : 3 * row + 3] = simulator.jacobian(marker.part, point)[3:]
-        return Innovation(y, H, source.noise * np.eye(len(y)))
+        y, H = np.empty(3 * len(seen)), np.empty((3 * len(seen), simulator.nv))
+        links, places = _markers(simulator, source)
+        scratch = np.empty((6, simulator.nv))
+        memory = simulator.memory
+        see_points(memory.links, memory.work, links[seen], places[seen], measurement.points[seen], y, H, scratch)
+        return Innovation(y, H, _alike(len(y), source.noise))
     assert isinstance(source, JointSource)
     assert isinstance(measurement, JointsMeasurement)
     y, H = np.zeros(len(measurement.names)), np.zeros((len(measurement.names), simulator.nv))
@@ -111,12 +118,72 @@ def innovation(source: MeasurementSource, measurement: Measurement, simulator: S
         if link.joint.kind is JointKind.REVOLUTE:  # an encoder may wrap where it likes
             y[row] = (y[row] + np.pi) % (2.0 * np.pi) - np.pi
         H[row, link.v] = 1.0
-    return Innovation(y, H, source.noise * np.eye(len(y)))
+    return Innovation(y, H, _alike(len(y), source.noise))
 
 
-def _frame(simulator: Simulator, source: PoseSource | OrientationSource) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Position, rotation and Jacobian (6, nv) of the measured frame."""
-    offset = np.array(source.frame.position)
-    position, R = simulator.pose(source.part)
-    jacobian = simulator.jacobian(source.part, offset)
-    return position + R @ offset, R @ rotations.matrix_from_quaternion(np.array(source.frame.orientation)), jacobian
+@kernel
+def see_frame(
+    links: Records,
+    work: Records,
+    link: int,
+    place: Array,
+    axes: Array,
+    position: Array,
+    orientation: Array,
+    y: Array,
+    H: Array,
+) -> None:
+    """Fill y (6,) and H (6, nv) with what a measured pose says of the frame at place (3,) with axes (3, 3) on a link."""
+    point_jacobian(links, work, link, place, H)
+    p, R = get3(place), get9(axes.reshape(-1))
+    if link >= 0:
+        here = work[link]
+        p, R = plus(get3(here.origin), times(get9(here.rotation), p)), product(get9(here.rotation), R)
+    seen = rotation_of(orientation[0], orientation[1], orientation[2], orientation[3])
+    put3(y[:3], minus(get3(position), p))
+    put3(y[3:], vector_of(product(transposed(R), seen)))
+    for k in range(H.shape[1]):
+        turn, shift = (H[0, k], H[1, k], H[2, k]), (H[3, k], H[4, k], H[5, k])
+        put3(H[:3, k], shift)
+        put3(H[3:, k], transposed_times(R, turn))
+
+
+@kernel
+def see_points(
+    links: Records, work: Records, on: Array, places: Array, points: Array, y: Array, H: Array, scratch: Array
+) -> None:
+    """Fill y (3 k,) and H (3 k, nv) with what measured points (k, 3) say of places (k, 3) on links (k,); scratch (6, nv)."""
+    for i in range(points.shape[0]):
+        p, link = get3(places[i]), on[i]
+        point_jacobian(links, work, link, places[i], scratch)
+        if link >= 0:
+            here = work[link]
+            p = plus(get3(here.origin), times(get9(here.rotation), p))
+        put3(y[3 * i : 3 * i + 3], minus(get3(points[i]), p))
+        for c in range(3):
+            copy(scratch[3 + c], H[3 * i + c])
+
+
+NOWHERE = np.zeros(3)
+
+
+def _frame_seen(
+    simulator: Simulator, source: PoseSource | OrientationSource, position: np.ndarray, orientation: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The innovation y (6,) and H (6, nv) of a measured pose of the source's frame."""
+    y, H = np.empty(6), np.empty((6, simulator.nv))
+    frame = simulator.frame(source.part, source.frame.position, source.frame.orientation)
+    see_frame(simulator.memory.links, simulator.memory.work, *frame, position, orientation, y, H)
+    return y, H
+
+
+def _markers(simulator: Simulator, source: PointsSource) -> tuple[np.ndarray, np.ndarray]:
+    """(k,) link and (k, 3) place on it of each marker."""
+    frames = [simulator.frame(marker.part, marker.point) for marker in source.markers]
+    return np.array([link for link, _, _ in frames]), np.array([place for _, place, _ in frames])
+
+
+@cache
+def _alike(count: int, *deviations: float) -> np.ndarray:
+    """The lower factor of independent noise, ``count`` numbers of each deviation."""
+    return np.diag(np.repeat(deviations, count))

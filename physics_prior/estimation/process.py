@@ -13,10 +13,13 @@ from typing import Protocol
 
 import numpy as np
 
+from physics_prior.dynamics.covariance import carry, carry_step
 from physics_prior.dynamics.force_noise import PointForces
+from physics_prior.dynamics.manifold import difference
 from physics_prior.dynamics.simulator import Simulator
+from physics_prior.errors import SimulationError
 from physics_prior.estimation import events
-from physics_prior.estimation.square_root import carry_factor
+from physics_prior.estimation.square_root import lower_factor
 from physics_prior.scene import Scene
 
 
@@ -49,6 +52,13 @@ class Process(Protocol):
     def carry(self, state: State, factor: np.ndarray, h: float) -> np.ndarray:
         """Move the state in place by h seconds; return (n, n + g): a factor (n, n) of its errors carried, and one of noise."""
 
+    def predict(self, state: State, factor: np.ndarray, h: float, count: int) -> np.ndarray:
+        """Move the state in place by count steps of h seconds; return the lower factor (n, n) of its errors' covariance.
+
+        Raises:
+            SimulationError: the state or the factor is not finite, or the step was not possible.
+        """
+
     def displace(self, state: State, error: np.ndarray) -> State:
         """The state moved by an error (n,)."""
 
@@ -72,9 +82,14 @@ class _OnManifold(ABC):
 
     def carry(self, state: State, factor: np.ndarray, h: float) -> np.ndarray:
         F, G = self.advance(state, h)
-        W = np.empty((len(F), len(F) + G.shape[1]))
-        carry_factor(F, factor, G, W)
-        return W
+        return np.hstack([F @ factor, G])
+
+    def predict(self, state: State, factor: np.ndarray, h: float, count: int) -> np.ndarray:
+        for _ in range(count):
+            factor = lower_factor(self.carry(state, factor, h))
+        if not all(np.isfinite(array).all() for array in (state.q, state.v, state.acceleration, factor)):
+            raise SimulationError(f"the prediction is not finite after steps of {h:g} s: a smaller step size may do")
+        return factor
 
     def displace(self, state: State, error: np.ndarray) -> State:
         nv = self.simulator.nv
@@ -82,7 +97,8 @@ class _OnManifold(ABC):
         return State(q, state.v + error[nv : 2 * nv], state.acceleration + error[2 * nv :])
 
     def difference(self, start: State, end: State) -> np.ndarray:
-        turn = self.simulator.tree.difference(start.q, end.q)
+        turn = np.empty(self.simulator.nv)
+        difference(self.simulator.memory.links, start.q, end.q, turn)
         return np.concatenate([turn, end.v - start.v, end.acceleration - start.acceleration])
 
 
@@ -91,6 +107,7 @@ class PhysicsProcess(_OnManifold):
 
     def __init__(self, scene: Scene, simulator: Simulator) -> None:
         super().__init__(scene, simulator, 2 * simulator.nv)
+        self._own_noise = np.diag(scene.noise.force)
         self._effects_noise = PointForces(simulator)
 
     def start(self, q: np.ndarray, v: np.ndarray) -> State:
@@ -100,21 +117,28 @@ class PhysicsProcess(_OnManifold):
         return np.zeros(0)
 
     def advance(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
-        force, nv = self.scene.noise.force, self.simulator.nv
-        if not self._effects_noise.count:
-            return self.simulator.linearise(state.q, state.v, h, force)
-        columns = self._columns(state)
-        F, G = self.simulator.linearise(state.q, state.v, h, np.ones(nv))  # G is linear in the forces
-        return F, np.hstack([G[:, :nv] @ columns, G[:, nv:] @ columns])
+        return self.simulator.linearise(state.q, state.v, h, self._noise(state))
 
     def carry(self, state: State, factor: np.ndarray, h: float) -> np.ndarray:
-        if not len(self.simulator.candidates):
-            return super().carry(state, factor, h)
-        return events.carry(self.simulator, state.q, state.v, factor, self._columns(state), h)
+        if len(self.simulator.candidates):
+            return events.carry(self.simulator, state.q, state.v, factor, self._columns(state), h)
+        return carry_step(self.simulator, state.q, state.v, h, factor, self._noise(state))
+
+    def predict(self, state: State, factor: np.ndarray, h: float, count: int) -> np.ndarray:
+        if len(self.simulator.candidates):
+            return super().predict(state, factor, h, count)
+        once = self._effects_noise.count > 0  # their directions turn with the state
+        for _ in range(count if once else 1):
+            factor = carry(self.simulator, state.q, state.v, h, 1 if once else count, factor, self._noise(state))
+        return factor
+
+    def _noise(self, state: State) -> np.ndarray:
+        """(nv, nv): a factor of the density of the white generalized forces."""
+        return lower_factor(self._columns(state)) if self._effects_noise.count else self._own_noise
 
     def _columns(self, state: State) -> np.ndarray:
         """(nv, g): what generalized forces the independent white ones make, the scene's own first."""
-        return np.hstack([np.diag(self.scene.noise.force), self._effects_noise.columns(state.q, state.v)])
+        return np.hstack([self._own_noise, self._effects_noise.columns(state.q, state.v)])
 
 
 class KinematicProcess(_OnManifold):

@@ -13,7 +13,7 @@ from physics_prior.dynamics.switches import Hold
 from physics_prior.estimation.filter import Filter, Posterior
 from physics_prior.estimation.history import Node
 from physics_prior.estimation.process import State, steps
-from physics_prior.estimation.square_root import deviations, predicted_factor
+from physics_prior.estimation.square_root import deviations, lower_factor
 from physics_prior.estimation.switching import Grip, switch, take_hold
 
 NANOSECONDS = 1e9
@@ -86,7 +86,7 @@ def _steps(filter: Filter, posterior: Posterior, stamp: int) -> list[Step]:
         for index in range(count):
             predicted, n = state.copy(), len(factor)
             W = filter.process.carry(predicted, factor, h)
-            carried, noise, expected = W[:, :n].copy(), W[:, n:].copy(), predicted_factor(W)
+            carried, noise, expected = W[:, :n], W[:, n:], lower_factor(W)
             began = posterior.stamp + round(index * h * NANOSECONDS)
             out.append(Step(began, posterior.holds, state, factor, carried, noise, predicted, expected))
             state, factor = predicted, expected
@@ -117,7 +117,7 @@ def _back(
     gain = step.factor @ step.carried.T @ inverse.T @ inverse
     W = np.concatenate([step.factor - gain @ step.carried, gain @ step.noise, gain @ factor], axis=1)
     smoothed = filter.process.displace(step.state, gain @ filter.process.difference(step.predicted, state))
-    out = predicted_factor(W)
+    out = lower_factor(W)
     filter.simulator.switches.holds = step.holds
     filter.simulator.time = (step.stamp - begun) / NANOSECONDS
     filter.constrain(smoothed, out)

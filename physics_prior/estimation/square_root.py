@@ -1,103 +1,73 @@
-"""Square-root covariance: P = S S^T is never formed, so that it is symmetric and positive semi-definite for ever.
+"""The square root of a covariance P = S S^T, told of a measurement.
 
-Orthogonal triangularisation from the right (Bierman 1977; Kailath, Sayed and Hassibi 2000, ch. 12): for any orthogonal U,
-[A][A]^T = [A U][A U]^T, and a triangular A U is the new factor.
+S is kept in Fortran's order, so that its transpose U, which the kernels reflect (dynamics/covariance.py), is in C's.
 """
 
 import math
 
 import numpy as np
 
+from physics_prior.dynamics.covariance import triangularise
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.types import Array
 
 ROUNDING = 1e-10  # of the largest standard deviation: below it, another is that of a direction that constraints forbid
 
 
-@kernel
-def triangularise(W: Array) -> None:
-    """Make W (n, N >= n) lower triangular in place by Householder reflections of its rows; W W^T stays what it was."""
+def lower_factor(W: np.ndarray) -> np.ndarray:
+    """The lower factor (n, n) of W W^T; W (n, N >= n)."""
     n, N = W.shape
-    for i in range(n):
-        norm = 0.0
-        for k in range(i, N):
-            norm += W[i, k] * W[i, k]
-        norm = math.sqrt(norm)
-        if norm == 0.0:
-            continue
-        head = W[i, i]
-        pivot = -norm if head > 0.0 else norm
-        W[i, i] = head - pivot  # row i now holds the Householder vector, of squared length 2 (norm^2 + norm |head|)
-        scale = 1.0 / (norm * (norm + abs(head)))
-        for j in range(i + 1, n):
-            total = 0.0
-            for k in range(i, N):
-                total += W[i, k] * W[j, k]
-            total *= scale
-            for k in range(i, N):
-                W[j, k] -= total * W[i, k]
-        W[i, i] = pivot
-        for k in range(i + 1, N):
-            W[i, k] = 0.0
-        if pivot < 0.0:
-            for j in range(i, n):
-                W[j, i] = -W[j, i]
+    T = np.array(W.T, order="C")
+    triangularise(T, n, np.empty(N + n))
+    return T[:n].T
 
 
 @kernel
-def carry_factor(F: Array, S: Array, G: Array, W: Array) -> None:
-    """Fill W (n, n + g) with [F S  G], whose W W^T is the predicted covariance F S S^T F^T + G G^T. S (n, n); G (n, g)."""
-    n, g = S.shape[0], G.shape[1]
-    for i in range(n):
-        for j in range(n):
-            W[i, j] = 0.0
-        for k in range(n):
-            f = F[i, k]
-            if f != 0.0:
-                for j in range(n):
-                    W[i, j] += f * S[k, j]
-        for j in range(g):
-            W[i, n + j] = G[i, j]
+def innovate(
+    U: Array, H: Array, noise: Array, y: Array, T: Array, scratch: Array, correction: Array
+) -> tuple[float, float, float]:
+    """Tell a factor U (n, n), P = U^T U, of an innovation y (m,), to which H (m, h <= n) makes the first h errors; fill T.
 
-
-def predicted_factor(W: np.ndarray) -> np.ndarray:
-    """The lower factor (n, n) of W W^T; W (n, N >= n) is scratch afterwards."""
-    triangularise(W)
-    return np.ascontiguousarray(W[:, : len(W)])
-
-
-@kernel
-def innovate(S: Array, H: Array, noise: Array, W: Array, whitened: Array, y: Array) -> float:
-    """Triangularise [[noise, H S], [0, S]] in W (m + n, m + n) and whiten the innovation y (m,); return its squared length.
-
-    H (m, k <= n) acts on the first k errors; noise (m, m) is a lower factor. Afterwards W = [[factor of the innovation's
-    covariance, 0], [gain times it, factor of the posterior]].
+    Return the squared length of y, whitened, the logarithm of the determinant of its covariance, and the largest of the first h
+    corrections; fill the correction (n,), gain times y. noise (m, m): a lower factor.
+    Reflections turn T = [[noise^T, 0], [U H^T, U]], (m + n, m + n), into [[factor of the innovation's covariance, its product
+    with the gain], [0, factor of the posterior]], all transposed. scratch (2 m + 2 n,).
     """
-    m, n, h = H.shape[0], S.shape[0], H.shape[1]
+    m, n, h = H.shape[0], U.shape[0], H.shape[1]
     for i in range(m):
+        row = T[i]
         for j in range(m):
-            W[i, j] = noise[i, j]
+            row[j] = noise[j, i]
         for j in range(n):
-            W[i, m + j] = 0.0
-        for k in range(h):
-            value = H[i, k]
-            if value != 0.0:
-                for j in range(n):
-                    W[i, m + j] += value * S[k, j]
-    for i in range(n):
+            row[m + j] = 0.0
+    for k in range(n):
+        row, own = T[m + k], U[k]
         for j in range(m):
-            W[m + i, j] = 0.0
+            row[j] = 0.0
         for j in range(n):
-            W[m + i, m + j] = S[i, j]
-    triangularise(W)
-    nis = 0.0
+            row[m + j] = own[j]
+        for j in range(h):
+            if own[j] != 0.0:
+                for i in range(m):
+                    row[i] += own[j] * H[i, j]
+    triangularise(T, m, scratch)
+    nis, determinant = 0.0, 0.0
+    for j in range(n):
+        correction[j] = 0.0
     for i in range(m):
-        total = y[i]
+        white = y[i]
         for j in range(i):
-            total -= W[i, j] * whitened[j]
-        whitened[i] = total / W[i, i]
-        nis += whitened[i] * whitened[i]
-    return nis
+            white -= T[j, i] * scratch[j]
+        white /= T[i, i]
+        scratch[i] = white
+        nis += white * white
+        determinant += 2.0 * math.log(T[i, i])
+        for j in range(n):
+            correction[j] += white * T[i, m + j]
+    largest = 0.0
+    for j in range(h):
+        largest = max(largest, abs(correction[j]))
+    return nis, determinant, largest
 
 
 def deviations(S: np.ndarray) -> np.ndarray:

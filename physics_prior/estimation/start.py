@@ -7,7 +7,7 @@ from scipy.stats import chi2
 
 from physics_prior.estimation.filter import Filter, Posterior
 from physics_prior.estimation.measurement import Measurement
-from physics_prior.estimation.square_root import triangularise
+from physics_prior.estimation.square_root import lower_factor
 from physics_prior.estimation.switching import switch
 from physics_prior.model import JointKind, Tree
 
@@ -126,8 +126,7 @@ def _gauss_newton(
         return None
     factor = np.zeros((simulator.nv, simulator.nv))
     factor[:, : basis.shape[1]] = basis @ V.T / s
-    triangularise(factor)
-    return float(y @ y - np.sum((U.T @ y) ** 2)), state.q, factor, len(y) - basis.shape[1]
+    return float(y @ y - np.sum((U.T @ y) ** 2)), state.q, lower_factor(factor), len(y) - basis.shape[1]
 
 
 def _turning(tree: Tree) -> np.ndarray:

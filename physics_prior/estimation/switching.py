@@ -18,7 +18,7 @@ from physics_prior.dynamics.switches import Hold
 from physics_prior.errors import SimulationError
 from physics_prior.estimation.measurement import ForceMeasurement, Measurement, SwitchCommand
 from physics_prior.estimation.process import State
-from physics_prior.estimation.square_root import triangularise
+from physics_prior.estimation.square_root import lower_factor
 from physics_prior.scene import SwitchSource
 
 if TYPE_CHECKING:
@@ -110,9 +110,8 @@ def take_hold(filter: "Filter", posterior: "Posterior", index: int) -> Grip:
     F = np.zeros((2 * nv, 2 * nv))
     F[:nv, :nv] = np.eye(nv)
     F[nv:] = _impulse_derivative(simulator, state)
-    after, factor_after = state.copy(), F @ factor
+    after, factor_after = state.copy(), lower_factor(F @ factor)
     simulator.project_velocity(after.q, after.v)
-    triangularise(factor_after)
     simulator.constrain(after.q, after.v, factor_after)
     return Grip(switches.holds, state, factor, F, after, factor_after)
 
@@ -135,9 +134,7 @@ def _condition(filter: "Filter", state: State, factor: np.ndarray, index: int) -
         state = process.displace(prior, factor @ z)
         if np.max(np.abs(factor @ (z - before))) < ASSEMBLED:
             break
-    out = factor - (factor @ V.T) @ V
-    triangularise(out)
-    return state, out
+    return state, lower_factor(factor - (factor @ V.T) @ V)
 
 
 def _impulse_derivative(simulator: Simulator, state: State) -> np.ndarray:

@@ -6,23 +6,33 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
-from physics_prior.estimation.square_root import (
-    carry_factor,
-    innovate,
-    normalised_error,
-    predicted_factor,
-    triangularise,
-)
+from physics_prior.dynamics.covariance import carry_factor, triangularise
+from physics_prior.estimation.square_root import innovate, lower_factor, normalised_error
 
 seeds = st.integers(0, 2**32 - 1)
 
 
 def _factor(rng, n, decades):
     """Lower factor of a covariance whose standard deviations span 10^-decades to 10^decades."""
-    S = np.zeros((n, n))
-    S[:] = 10.0 ** rng.uniform(-decades, decades, size=(n, 1)) * rng.normal(size=(n, n))
-    triangularise(S)
-    return S
+    return lower_factor(10.0 ** rng.uniform(-decades, decades, size=(n, 1)) * rng.normal(size=(n, n)))
+
+
+def _carry(F, S, G):
+    """The lower factor of F S S^T F^T + G G^T."""
+    n, g = G.shape
+    T = np.empty((n + g, n))
+    carry_factor(F.copy(), G, np.ascontiguousarray(S.T), T)
+    triangularise(T, n, np.empty(2 * n + g))
+    return T[:n].T
+
+
+def _update(S, H, noise, y):
+    """NIS, correction and posterior factor, and the logarithm of the determinant of the innovation's covariance."""
+    n, m = len(S), len(y)
+    T, correction = np.empty((m + n, m + n)), np.empty(n)
+    nis, determinant, largest = innovate(np.ascontiguousarray(S.T), H, noise, y, T, np.empty(2 * (m + n)), correction)
+    assert largest == np.max(np.abs(correction[: H.shape[1]]))
+    return nis, correction, T[m:, m:].T, determinant
 
 
 def _relative(difference, covariance):
@@ -35,16 +45,14 @@ def _relative(difference, covariance):
 def test_triangularise_keeps_the_square(seed, n, more):
     rng = np.random.default_rng(seed)
     W = 10.0 ** rng.uniform(-6, 6, size=(n, 1)) * rng.normal(size=(n, n + more))
-    L = W.copy()
-    triangularise(L)
+    L = lower_factor(W)
     assert np.array_equal(np.triu(L, 1), np.zeros_like(L))
     assert np.all(np.diag(L) >= 0.0)
     assert _relative(L @ L.T - W @ W.T, W @ W.T) < 1e-13  # 1e-15
 
 
 def test_triangularise_leaves_zero_rows_alone():
-    W = np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 0.0]])
-    triangularise(W)
+    W = lower_factor(np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 0.0]]))
     np.testing.assert_allclose(W @ W.T, [[0.0, 0.0], [0.0, 25.0]], atol=1e-15)
 
 
@@ -53,9 +61,7 @@ def test_prediction_is_the_dense_one(seed, n, g):
     rng = np.random.default_rng(seed)
     F, G, S = rng.normal(size=(n, n)), rng.normal(size=(n, g)), _factor(rng, n, 0)
     expected = F @ S @ S.T @ F.T + G @ G.T
-    W = np.empty((n, n + g))
-    carry_factor(F, S, G, W)
-    S = predicted_factor(W)
+    S = _carry(F, S, G)
     assert _relative(S @ S.T - expected, expected) < 1e-13  # 1e-15
 
 
@@ -65,8 +71,7 @@ def test_update_is_the_dense_one(seed, n, m, unseen):
     size = max(1, n - unseen)
     H, S, noise, y = rng.normal(size=(m, size)), _factor(rng, n, 0), _factor(rng, m, 0), rng.normal(size=m)
     noise += np.eye(m)
-    W, whitened = np.empty((m + n, m + n)), np.empty(m)
-    nis = innovate(S, H, noise, W, whitened, y)
+    nis, correction, posterior, determinant = _update(S, H, noise, y)
     full = np.hstack([H, np.zeros((m, n - size))])
     P, R = S @ S.T, noise @ noise.T
     innovation = full @ P @ full.T + R
@@ -74,8 +79,9 @@ def test_update_is_the_dense_one(seed, n, m, unseen):
     joseph = (np.eye(n) - K @ full) @ P @ (np.eye(n) - K @ full).T + K @ R @ K.T
     conditioning = np.linalg.cond(innovation)
     assert nis == pytest.approx(y @ np.linalg.solve(innovation, y), rel=1e-13 * conditioning)
-    np.testing.assert_allclose(W[m:, :m] @ whitened, K @ y, rtol=0, atol=1e-13 * conditioning * np.linalg.norm(K @ y))
-    assert _relative(W[m:, m:] @ W[m:, m:].T - joseph, P) < 1e-13 * conditioning
+    np.testing.assert_allclose(correction, K @ y, rtol=0, atol=1e-13 * conditioning * np.linalg.norm(K @ y))
+    assert _relative(posterior @ posterior.T - joseph, P) < 1e-13 * conditioning
+    assert determinant == pytest.approx(np.linalg.slogdet(innovation)[1], rel=1e-9, abs=1e-9)
 
 
 @settings(max_examples=20)
@@ -85,19 +91,15 @@ def test_thousands_of_updates_at_extreme_variances(seed):
     rng = np.random.default_rng(seed)
     n, m = 4, 2
     S = np.diag(10.0 ** rng.uniform(-6, 6, size=n))
-    W, whitened = np.empty((m + n, m + n)), np.empty(m)
-    scratch = np.empty((n, 2 * n))
     for _ in range(2000):
         noise = np.diag(10.0 ** rng.uniform(-6, 6, size=m))  # variances 1e-12 to 1e12
         before = np.sum(S * S, axis=1)
-        nis = innovate(S, rng.normal(size=(m, n)), noise, W, whitened, rng.normal(size=m))
+        nis, _, S, _ = _update(S, rng.normal(size=(m, n)), noise, rng.normal(size=m))
         assert np.isfinite(nis)
-        S = np.ascontiguousarray(W[m:, m:])
         assert np.isfinite(S).all()
         assert np.all(np.sum(S * S, axis=1) <= before * (1.0 + 1e-9))  # a measurement never takes knowledge away
         G = np.diag(10.0 ** rng.uniform(-8, 1, size=n))
-        carry_factor(np.eye(n) + 0.1 * rng.normal(size=(n, n)), S, G, scratch)
-        S = predicted_factor(scratch)
+        S = _carry(np.eye(n) + 0.1 * rng.normal(size=(n, n)), S, G)
     P = S @ S.T
     assert np.array_equal(P, P.T)
     deviations = np.sqrt(np.diag(P))
@@ -110,12 +112,10 @@ def test_many_measurements_add_up_their_information():
     n, m = 5, 3
     S = np.diag(10.0 ** rng.uniform(-1, 3, size=n))
     information = np.linalg.inv(S @ S.T)
-    W, whitened = np.empty((m + n, m + n)), np.empty(m)
     for _ in range(5000):
         H, noise = rng.normal(size=(m, n)), np.diag(10.0 ** rng.uniform(-1, 3, size=m))
         information += H.T @ np.linalg.inv(noise @ noise.T) @ H
-        innovate(S, H, noise, W, whitened, np.zeros(m))
-        S = np.ascontiguousarray(W[m:, m:])
+        _, _, S, _ = _update(S, H, noise, np.zeros(m))
     expected = np.linalg.inv(information)
     assert _relative(S @ S.T - expected, expected) < 1e-12  # 2e-14
 

@@ -97,9 +97,12 @@ def linearise_smooth(
             middle[k] = v[k] + ahead * vdot[k]
         clear(theta_x)
         accumulate(ahead, rate_x, theta_x)
-        clear(rate_x)
-        add_product(by_q, q_x, rate_x)
-        add_product(by_v, v_x, rate_x)
+        if stage == 0:  # q_x and v_x are those of the state itself
+            copy(derivative, rate_x)
+        else:
+            clear(rate_x)
+            add_product(by_q, q_x, rate_x)
+            add_product(by_v, v_x, rate_x)
         accumulate(weight, rate_x, v_sum_x)
         clear(v_x)
         for k in range(nv):

@@ -271,8 +271,12 @@ class PhysicsPriorNode(LifecycleNode):
             self.get_logger().error(f"{error}; the estimate starts anew")
             self._reset()
             return
-        self._latest = estimate
+        before, self._latest = self._latest, estimate
         self._watch_health()
+        if before is not None and self._value("diagnostics_rate") > 0.0:
+            active = self._output.active_effects
+            if active(estimate) != active(before):  # told at once: when is as much asked for as which
+                self._diagnose()
 
     def _draw(self) -> None:
         assert self._output is not None

@@ -214,11 +214,24 @@ def test_check_tells_what_is_simulated_and_what_it_costs(capsys):
         assert fact in out
 
 
+def test_check_tells_as_json_what_each_effect_adds_to_a_step(capsys):
+    code, out, err = run(capsys, "check", "four_bar", "--cost", "--json", "-")
+    assert (code, err) == (0, "")
+    told = json.loads(out)
+    gravity, pin = told["effects"]
+    assert (gravity["name"], gravity["rows"], pin["name"], pin["rows"]) == ("gravity", 0, "ground_pin", 3)
+    assert pin["why"].startswith("pins a point of rocker")
+    assert all(isinstance(each["us_per_step"], float) for each in told["effects"])  # measured 1.8 and 2.8
+    assert told["state"] == {"q": 3, "v": 3, "error_state": 6}
+    assert told["constraints"] == {"rows": 3, "acting": 3, "rank": 2}
+    assert told["step"]["us_with_derivatives"] > told["step"]["us"] > 0.0
+
+
 def test_check_tells_rows_of_what_may_touch(capsys, tmp_path):
     (tmp_path / "table.yaml").write_text(TABLE)
     code, out, err = run(capsys, "check", tmp_path / "table.yaml")
     assert (code, err) == (0, "")
-    rows = {line.split()[0]: line.split()[-1] for line in out.splitlines() if "up to" in line and line.split()}
+    rows = {line.split()[0]: line.split()[-3] for line in out.splitlines() if "up to" in line and "--cost" in line}
     # eight points of a box on a plane with friction; two of a capsule without, one of a ball with rolling; a stop
     assert (rows["floor"], rows["rods"], rows["bowl"], rows["stop"]) == ("24", "2", "5", "1")
     assert "none beside the joints; up to 32 rows while something touches" in out

@@ -1,8 +1,10 @@
-"""A scene, explained in tables: what is simulated, what is measured and told, what a step costs."""
+"""A scene, explained in tables and figures: what is simulated, what is measured and told, what a step costs."""
 
 import statistics
 import time
+from collections.abc import Sequence
 from math import degrees
+from typing import Any
 
 from rich.table import Table
 
@@ -33,17 +35,50 @@ MOST_POINTS = {"sphere": 1, "ellipsoid": 1, "capsule": 2, "box": SLOTS, "plane":
 ROUNDS, STEPS, LINEARISATIONS = 15, 100, 10  # of timing: medians over rounds
 
 
-def explain(scene: Scene) -> None:
-    """Print everything about a scene; compiles its step where it is not yet."""
-    with compiling(scene, "carry"):
-        simulator = scene.simulator()
-        state = _state(scene, simulator)
+def explain(scene: Scene, figures: dict[str, Any]) -> None:
+    """Print everything about a scene, with ``scene_figures`` of it."""
     out = console()
     out.print(scene.name, style="bold")
     out.print(scene.description)
-    for part in (_model(scene), _effects(scene), _measurements(scene), _readouts(scene), state):
+    parts = (_model(scene), _effects(figures), _measurements(scene), _readouts(scene), _state(scene, figures))
+    for part in parts:
         out.print()
         out.print(part)
+
+
+def scene_figures(scene: Scene, costs: Sequence[float] | None = None) -> dict[str, Any]:
+    """The figures of a scene, for JSON: ``effects`` in their order, ``state`` and ``step``; compiles its step if it is not yet.
+
+    costs: what each effect adds to a step, us, where that was measured.
+    """
+    with compiling(scene, "carry"):
+        simulator = scene.simulator()
+        step, with_derivatives = _cost(scene, simulator)
+    effects = []
+    for place, effect in enumerate(scene.effects):
+        equal, unequal = _rows(scene, effect)
+        effects.append(
+            {
+                "name": effect.label,
+                "kind": effect.kind,
+                "why": effect.explain(scene.tree),
+                "rows": equal,
+                "most_rows_while_touching": unequal,
+                "us_per_step": None if costs is None else costs[place],
+            }
+        )
+    return {
+        "scene": scene.name,
+        "effects": effects,
+        "state": {"q": simulator.nq, "v": simulator.nv, "error_state": 2 * simulator.nv},
+        "constraints": {"rows": simulator.rows, "acting": simulator.switches.rows, "rank": simulator.rank},
+        "step": {
+            "integrator": scene.step.integrator,
+            "size": scene.step.size,
+            "us": step,
+            "us_with_derivatives": with_derivatives,
+        },
+    }
 
 
 def step_text(scene: Scene) -> str:
@@ -61,15 +96,23 @@ def _model(scene: Scene) -> Table:
     return out
 
 
-def _effects(scene: Scene) -> Table:
-    out = table("effects: these and nothing else", "effect", "kind", "what it does", "rows", numbers=1)
-    for effect in scene.effects:
-        equal, unequal = _rows(scene, effect)
-        rows = f"up to {unequal}" if unequal else str(equal or "")
-        out.add_row(effect.label, effect.kind, effect.explain(scene.tree), rows)
-    if not scene.effects:
-        out.add_row("none", "", "nothing acts on the body", "")
+def _effects(figures: dict[str, Any]) -> Table:
+    columns = ("effect", "kind", "what it does", "rows", "us a step")
+    out = table("effects: these and nothing else", *columns, numbers=2)
+    for each in figures["effects"]:
+        most, cost = each["most_rows_while_touching"], each["us_per_step"]
+        rows = f"up to {most}" if most else str(each["rows"] or "")
+        out.add_row(each["name"], each["kind"], each["why"], rows, _price(cost))
+    if not figures["effects"]:
+        out.add_row("none", "", "nothing acts on the body", "", "")
     return out
+
+
+def _price(cost: float | None) -> str:
+    """What an effect adds to a step, for people; what is below the clock's own noise is said to be."""
+    if cost is None:
+        return "see --cost"
+    return f"{cost:.2f}" if abs(cost) >= 0.01 else "< 0.01"
 
 
 def _rows(scene: Scene, effect: Effect) -> tuple[int, int]:
@@ -139,32 +182,34 @@ def _axis(axis: tuple[float, float, float]) -> str:
     return names.get(axis) or "({:.3g}, {:.3g}, {:.3g})".format(*axis)
 
 
-def _state(scene: Scene, simulator: Simulator) -> Table:
-    step, with_derivatives = _cost(scene, simulator)
+def _state(scene: Scene, figures: dict[str, Any]) -> Table:
+    state, step = figures["state"], figures["step"]
     out = table("state and step", "", "")
-    out.add_row("state", f"q {simulator.nq}, v {simulator.nv}; error state {2 * simulator.nv}")
-    out.add_row("constraints", _constraints(scene, simulator))
+    out.add_row("state", f"q {state['q']}, v {state['v']}; error state {state['error_state']}")
+    out.add_row("constraints", _constraints(figures))
     own = [topic for topic in topics_of(scene) if not topic.endswith("/stddev")]
     out.add_row("publishes", ", ".join(own) + "; of joints and forces also TOPIC/stddev")
-    out.add_row("step", f"{scene.step.integrator}, {scene.step.size * 1e3:g} ms")
-    out.add_row("cost of a step", f"{step:.3g} us here; with its derivatives {with_derivatives:.3g} us")
-    out.add_row("faster than real time", f"{scene.step.size / step * 1e6:,.0f}x, one core")
+    out.add_row("step", f"{step['integrator']}, {step['size'] * 1e3:g} ms")
+    out.add_row(
+        "cost of a step", f"{step['us']:.3g} us here; with its derivatives {step['us_with_derivatives']:.3g} us"
+    )
+    out.add_row("faster than real time", f"{step['size'] / step['us'] * 1e6:,.0f}x, one core")
     return out
 
 
-def _constraints(scene: Scene, simulator: Simulator) -> str:
-    most = sum(_rows(scene, effect)[1] for effect in scene.effects)
-    return _equalities(simulator) + (f"; up to {most} rows while something touches" if most else "")
+def _constraints(figures: dict[str, Any]) -> str:
+    most = sum(each["most_rows_while_touching"] for each in figures["effects"])
+    return _equalities(figures["constraints"]) + (f"; up to {most} rows while something touches" if most else "")
 
 
-def _equalities(simulator: Simulator) -> str:
-    if simulator.rows == 0:
+def _equalities(constraints: dict[str, int]) -> str:
+    total, acting, rank = constraints["rows"], constraints["acting"], constraints["rank"]
+    if total == 0:
         return "none beside the joints"
-    acting = simulator.switches.rows
-    rows = f"{acting} rows of rank {simulator.rank}"
-    if acting < simulator.rows:
-        rows += f" at the start, {simulator.rows} where all holds"
-    if simulator.rank < simulator.switches.rows:
+    rows = f"{acting} rows of rank {rank}"
+    if acting < total:
+        rows += f" at the start, {total} where all holds"
+    if rank < acting:
         return f"{rows}: the motion is unique, the split of forces is not (the smallest is given)"
     return rows
 

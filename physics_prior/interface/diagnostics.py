@@ -19,15 +19,9 @@ def diagnostics(
 ) -> DiagnosticArray:
     """One status; ``estimate`` is None before the first, ``more`` is what its caller alone knows."""
     values: dict[str, object] = {f"measurements {name}": count for name, count in vars(counts).items()}
-    switches = simulator.switches
-    holding = switches.holding if estimate is None else estimate.holding
-    touching = [name for name in simulator.touching if estimate is not None and estimate.wrenches[name].acts]
-    acting = {*holding, *touching}
-    reactions = {effect.label: effect.reactions(scene.tree) for effect in scene.effects}
-    active = [label for label, names in reactions.items() if not names or acting.intersection(names)]
-    values["active effects"] = ", ".join(active) or "none"
+    values["active effects"] = ", ".join(active_effects(scene, simulator, estimate)) or "none"
     if simulator.touching:
-        values["touching"] = ", ".join(touching) or "nothing"
+        values["touching"] = ", ".join(_touching(simulator, estimate)) or "nothing"
         values["contact residual"] = f"{simulator.contact_residual:.3g}"
     if estimate is not None:
         nis, dimension = estimate.nis
@@ -47,3 +41,15 @@ def diagnostics(
         values=[KeyValue(key, str(value)) for key, value in (values | dict(more)).items()],
     )
     return DiagnosticArray(header, [status])
+
+
+def active_effects(scene: Scene, simulator: Simulator, estimate: Estimate | None) -> list[str]:
+    """The labels of the effects that act: those that push, and those that hold or touch something now."""
+    holding = simulator.switches.holding if estimate is None else estimate.holding
+    acting = {*holding, *_touching(simulator, estimate)}
+    reactions = {effect.label: effect.reactions(scene.tree) for effect in scene.effects}
+    return [label for label, names in reactions.items() if not names or acting.intersection(names)]
+
+
+def _touching(simulator: Simulator, estimate: Estimate | None) -> list[str]:
+    return [name for name in simulator.touching if estimate is not None and estimate.wrenches[name].acts]

@@ -1,6 +1,6 @@
-"""Markers out: what RViz and Foxglove draw. Parts as shapes, forces as arrows, contacts as dots, uncertainty as ellipsoids."""
+"""Markers out, for RViz and Foxglove: parts as shapes, forces as arrows, touching and holding as dots, uncertainty as ellipsoids."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from scipy.stats import chi2
@@ -21,6 +21,7 @@ RADIUS = float(np.sqrt(chi2.ppf(PROBABILITY, 3)))  # in standard deviations
 PART_COLOR = ColorRGBA(0.55, 0.65, 0.8, 1.0)
 FORCE_COLOR = ColorRGBA(0.85, 0.2, 0.15, 1.0)
 CONTACT_COLOR = ColorRGBA(0.1, 0.75, 0.3, 1.0)
+HOLD_COLOR = ColorRGBA(0.6, 0.2, 0.75, 1.0)
 UNCERTAINTY_COLOR = ColorRGBA(0.95, 0.75, 0.1, 0.4)
 
 
@@ -28,7 +29,7 @@ def markers(header: Header, forces: list[str], estimate: Estimate, simulator: Si
     """Draw an estimate. A marker keeps namespace and id: parts and links by their order in the tree, forces by theirs.
 
     An ellipsoid holds the link's centre of mass with 95 % probability; an arrow begins where its force acts. Both are
-    drawn from one thousandth of the model's size on. A dot stands, while something touches, where its force acts.
+    drawn from one thousandth of the model's size on. A dot stands, while something touches or holds, where its force acts.
     Calls ``simulator.move``.
     """
     simulator.move(estimate.q, estimate.v)
@@ -36,7 +37,8 @@ def markers(header: Header, forces: list[str], estimate: Estimate, simulator: Si
     drawn = [
         *_parts(header, simulator),
         *_forces(header, forces, estimate, size, simulator.tree.mass),
-        *_contacts(header, simulator, estimate, size),
+        *_dots(header, "contacts", CONTACT_COLOR, _touching(simulator, estimate), estimate, size),
+        *_dots(header, "attachments", HOLD_COLOR, _holding(simulator, estimate), estimate, size),
         *_uncertainty(header, estimate, simulator, size),
     ]
     return MarkerArray(drawn)
@@ -107,18 +109,28 @@ def _forces(header: Header, forces: list[str], estimate: Estimate, size: float, 
         )
 
 
-def _contacts(header: Header, simulator: Simulator, estimate: Estimate, size: float) -> Iterator[Marker]:
-    for index, name in enumerate(simulator.touching):
-        wrench = estimate.wrenches[name]
+def _touching(simulator: Simulator, estimate: Estimate) -> dict[str, bool]:
+    return {name: estimate.wrenches[name].acts for name in simulator.touching}
+
+
+def _holding(simulator: Simulator, estimate: Estimate) -> dict[str, bool]:
+    return {name: name in estimate.holding for name in simulator.switches.labels}
+
+
+def _dots(
+    header: Header, namespace: str, color: ColorRGBA, shown: Mapping[str, bool], estimate: Estimate, size: float
+) -> Iterator[Marker]:
+    """A dot where each of these forces acts, or none."""
+    for index, (name, there) in enumerate(shown.items()):
         yield Marker(
             header,
-            "contacts",
+            namespace,
             index,
             Marker.SPHERE,
-            Marker.ADD if wrench.acts else Marker.DELETE,
-            pose_of(wrench.point, np.array([1.0, 0.0, 0.0, 0.0])),
+            Marker.ADD if there else Marker.DELETE,
+            pose_of(estimate.wrenches[name].point, np.array([1.0, 0.0, 0.0, 0.0])),
             Vector3(DOT * size, DOT * size, DOT * size),
-            CONTACT_COLOR,
+            color,
         )
 
 

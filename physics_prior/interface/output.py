@@ -93,6 +93,10 @@ class Output:
         status = diagnostics.diagnostics(header, self._scene, self._simulator, health, counts, estimate, more)
         return [(DIAGNOSTICS, status)]
 
+    def active_effects(self, estimate: Estimate) -> list[str]:
+        """The names of the effects that act in an estimate, as its diagnostics tell them."""
+        return diagnostics.active_effects(self._scene, self._simulator, estimate)
+
     def _header(self, stamp: int) -> Header:
         return header_of(stamp, self._scene.frame_id)
 

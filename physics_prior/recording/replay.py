@@ -148,6 +148,7 @@ class _Replay:
         self.innovations: list[tuple[int, float, int, bool, str]] = []
         self.first_stamp: int | None = None
         self.next_markers = self.next_diagnostics = 0
+        self.active: list[str] = []
 
     def run(self, out: Path | None, progress: Callable[[float], None] | None) -> ReplayResult:
         began = time.perf_counter()
@@ -230,16 +231,18 @@ class _Replay:
                 self.true.append((posterior.stamp, true))
 
     def _file(self, posterior: Posterior, log_time: int, health: Health) -> None:
-        """Write what the node would publish: states each time, pictures and diagnostics at their own pace."""
+        """Write what the node would: states each time, pictures and diagnostics at their pace, these also when effects change."""
         assert self.writer is not None
         estimate = self.estimator.describe(posterior)
         publications = self.output.states(estimate)
         if log_time >= self.next_markers:
             publications += self.output.markers(estimate)
             self.next_markers = log_time + round(MARKER_PERIOD * NANOSECONDS)
-        if log_time >= self.next_diagnostics:
+        active = self.output.active_effects(estimate)
+        if log_time >= self.next_diagnostics or active != self.active:
             publications += self.output.diagnostics(posterior.stamp, health, self.estimator.counts, estimate)
             self.next_diagnostics = log_time + round(DIAGNOSTICS_PERIOD * NANOSECONDS)
+            self.active = active
         for topic, message in publications:
             self.writer.write(_absolute(topic), message, log_time)
 

@@ -155,6 +155,8 @@ def test_a_held_foot_shows_the_bodys_weight(published):
     np.testing.assert_allclose(array_of(message.wrench.force), [0.0, 0.0, 5 * G], atol=1e-9)
     np.testing.assert_allclose(array_of(message.wrench.torque), 0.0, atol=1e-9)
     assert array_of(markers["forces", 1].points[0]).tolist() == [0.0, 0.0, 1.0]
+    assert array_of(markers["attachments", 0].pose.position).tolist() == [0.0, 0.0, 1.0]
+    assert markers["attachments", 0].action == Marker.ADD
     assert values["active effects"] == "gravity, grip"
     assert "touching" not in values
 

@@ -8,6 +8,8 @@ import pytest
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.errors import SceneError
 from physics_prior.recording import decode, open_bag
+from physics_prior.recording.messages import Marker
+from physics_prior.recording.replay import replay
 from physics_prior.recording.simulate import EPOCH, motion, simulate
 from physics_prior.scene import load_scene
 
@@ -109,3 +111,24 @@ def test_the_truth_tells_what_holds(scene_of, tmp_path):
     for time, (name, state) in told.items():
         assert (name, state) == ("hand", "on" if 0.5 <= time < 0.8 else "off")
         assert (forces[time].z != 0.0) == (state == "on")
+
+
+def test_the_output_bag_of_a_replay_tells_which_effects_were_active_when(scene_of, tmp_path):
+    """Diagnostics at every change, not only at their pace of one a second; and the dot of what holds comes and goes."""
+    scene = scene_of("{from: 0.5 s, until: 0.8 s}")
+    simulate(scene, tmp_path / "bag", duration=1.2)
+    replay(tmp_path / "bag", scene, out=tmp_path / "out")
+    told, drawn = {}, {}
+    for record in open_bag(tmp_path / "out").read(["/diagnostics", "/markers"]):
+        message, time = decode(record.message_type, record.data), round((record.log_time_ns - EPOCH) * 1e-9, 3)
+        if record.topic == "/diagnostics":
+            told[time] = next(pair.value for pair in message.status[0].values if pair.key == "active effects")
+        else:
+            (dot,) = [marker for marker in message.markers if marker.ns == "attachments"]
+            drawn[time] = dot.action == Marker.ADD
+    started, *changes = told.items()
+    assert started == (0.01, "gravity")  # the first estimate that is final
+    assert changes[:2] == [(0.5, "gravity, hand"), (0.8, "gravity")]
+    assert {names for _, names in changes[2:]} <= {"gravity"}
+    assert len(drawn) > 20
+    assert all(there == (0.5 <= time < 0.8) for time, there in drawn.items())

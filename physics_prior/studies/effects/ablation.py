@@ -9,18 +9,14 @@ because it makes up for a damping that is a little off.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from statistics import median
-from time import perf_counter
 from typing import Any
 
 from physics_prior.errors import SceneError
 from physics_prior.estimation.measurement import Measurement
-from physics_prior.scene import Scene
+from physics_prior.studies.effects.cost import extra_cost
 from physics_prior.studies.effects.fit import fit
 from physics_prior.studies.effects.likelihood import Likelihood, likelihood
 from physics_prior.studies.effects.variant import SceneText, kind_of, label_of
-
-ROUNDS, STEPS = 15, 200  # of the timing: so many bursts, in turns, of so many steps
 
 
 @dataclass(frozen=True)
@@ -87,7 +83,7 @@ def ablate(
         others = [path for path in free if not scene.belongs(path, index)]
         rest = _best(text, others, measurements)[0].build()
         found = likelihood(rest, measurements)
-        verdicts.append(_judge(entry, numbers, base, found, _cost(whole, rest) if found is not None else None))
+        verdicts.append(_judge(entry, numbers, base, found, extra_cost(whole, rest) if found is not None else None))
     for place, entry in enumerate(proposed):
         report((len(scene.entries) + place) / total, f"with {label_of(entry)}")
         larger = scene.added(entry)
@@ -97,7 +93,7 @@ def ablate(
         better = text.build()
         strengths = {path: numbers_found[path] for path in own}
         found = likelihood(better, measurements)
-        verdicts.append(_judge(entry, max(1, len(own)), found, base, _cost(better, whole), strengths))
+        verdicts.append(_judge(entry, max(1, len(own)), found, base, extra_cost(better, whole), strengths))
     report(1.0, "done")
     return verdicts
 
@@ -159,21 +155,3 @@ def _pair(having: Likelihood | None, lacking: Likelihood | None, name: str) -> t
     values = [None if each is None else float(getattr(each, name)) for each in (having, lacking)]
     first, second = (None if value is None or not math.isfinite(value) else value for value in values)
     return first, second
-
-
-def _cost(larger: Scene, smaller: Scene) -> float:
-    """What a step of one scene costs more than that of another, us: the median of bursts in turns."""
-    moved = []
-    for scene in (larger, smaller):
-        simulator = scene.simulator()
-        q, v = scene.initial.q.copy(), scene.initial.v.copy()
-        simulator.begin(q, v)
-        moved.append((simulator, q, v, scene.step.size))
-    spans: list[list[float]] = [[], []]
-    for _ in range(ROUNDS):
-        for (simulator, q, v, h), own in zip(moved, spans, strict=True):
-            q_now, v_now = q.copy(), v.copy()
-            begun = perf_counter()
-            simulator.advance(q_now, v_now, h, STEPS)
-            own.append(perf_counter() - begun)
-    return 1e6 / STEPS * (median(spans[0]) - median(spans[1]))

@@ -7,6 +7,7 @@ from physics_prior.errors import PhysicsPriorError, SceneError
 
 _PACKAGE = "physics_prior"
 _SCENES = Path("config", "scenes")
+_MARKER_SETS = Path("config", "marker_sets")
 
 
 def share_directory() -> Path:
@@ -36,7 +37,7 @@ def shipped_scenes() -> list[str]:
     Raises:
         PhysicsPriorError: see ``share_directory``.
     """
-    return sorted(file.stem for file in (share_directory() / _SCENES).glob("*.yaml"))
+    return _shipped(_SCENES)
 
 
 def scene_path(name_or_path: str | Path) -> Path:
@@ -45,9 +46,22 @@ def scene_path(name_or_path: str | Path) -> Path:
     Raises:
         SceneError: neither a file nor a shipped scene; the message lists the shipped names.
     """
+    return _found(name_or_path, _SCENES, "scene")
+
+
+def marker_set_path(name_or_path: str | Path) -> Path:
+    """Find a marker set as ``scene_path`` finds a scene."""
+    return _found(name_or_path, _MARKER_SETS, "marker set")
+
+
+def _shipped(folder: Path) -> list[str]:
+    return sorted(file.stem for file in (share_directory() / folder).glob("*.yaml"))
+
+
+def _found(name_or_path: str | Path, folder: Path, noun: str) -> Path:
     if os.path.isfile(name_or_path):  # unlike Path.is_file, False for a name that no file can have
         return Path(name_or_path)
-    names = shipped_scenes()
+    names = _shipped(folder)
     if str(name_or_path) in names:
-        return share_directory() / _SCENES / f"{name_or_path}.yaml"
-    raise SceneError(f"scene '{name_or_path}' is neither a file nor a shipped scene; shipped are {', '.join(names)}")
+        return share_directory() / folder / f"{name_or_path}.yaml"
+    raise SceneError(f"{noun} '{name_or_path}' is neither a file nor a shipped {noun}; shipped are {', '.join(names)}")

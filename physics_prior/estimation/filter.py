@@ -14,14 +14,15 @@ from physics_prior.dynamics.simulator import Simulator
 from physics_prior.dynamics.switches import Hold
 from physics_prior.errors import MeasurementError
 from physics_prior.estimation import switching
+from physics_prior.estimation.gain import gain_of
 from physics_prior.estimation.measurement import ForceMeasurement, Measurement, SwitchCommand, command_topic
 from physics_prior.estimation.observation import Innovation, check, innovation
 from physics_prior.estimation.process import Process, State, steps
-from physics_prior.estimation.square_root import innovate
 from physics_prior.scene import MeasurementSource, Scene
 
 ITERATIONS = 5  # of the update, where one linearisation does not do
 SMALL_CORRECTION = 0.02  # rad or m: below it, one does
+QUORUM = 0.5  # of the markers of a frame: where the gate refuses more, the estimate is as suspect as they are
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +133,7 @@ class Filter:
         return self._limits[dimension]
 
     def update(self, prior: Posterior, measurement: Measurement, gated: bool = True) -> Posterior:
-        """The prior at the measurement's stamp, updated by it, if the gate lets it pass.
+        """The prior at the measurement's stamp, updated by it, if the gate lets it pass; each marker of a frame by itself.
 
         Iterated (Gauss-Newton, Bell and Cathey 1993) where the correction is too large for one linearisation.
         """
@@ -141,37 +142,46 @@ class Filter:
             return switching.switch(self, self._fresh(prior), *switching.decision(self, measurement, active))
         self.enter(prior)
         seen = self.innovation(measurement, prior.state)
-        m, n = len(seen.y), len(prior.factor)
-        if m == 0:
+        if len(seen.y) == 0:
             return self._fresh(prior)
-        U, T = np.ascontiguousarray(prior.factor.T), np.empty((m + n, m + n))
-        scratch, correction = np.empty(2 * (m + n)), np.empty(n)
-        nis, determinant, largest = innovate(U, seen.H, seen.noise, seen.y, T, scratch, correction)
-        if gated and not nis <= self.gate_limit(m):
-            refused = prior.refused + 1
+        many, believed = gated and len(seen.y) > seen.block, np.ones(len(seen.y) // seen.block, dtype=bool)
+        if many:
+            believed = seen.squares(prior.factor) <= self.gate_limit(seen.block)
+        doubtful = float(np.mean(believed)) < QUORUM
+        if not (doubtful or believed.all()):
+            seen = seen.kept(believed)
+        U = np.ascontiguousarray(prior.factor.T)
+        gain = gain_of(U, seen)
+        if doubtful or (gated and not many and not gain.nis <= self.gate_limit(len(seen.y))):
             return replace(
-                prior, nis=nis, dimension=m, log_determinant=determinant, refused=refused, used=False, start=False
+                prior,
+                nis=gain.nis,
+                dimension=len(seen.y),
+                log_determinant=gain.log_determinant,
+                refused=prior.refused + 1,
+                used=False,
+                start=False,
             )
-        state = self.process.displace(prior.state, correction)
-        for _ in range(ITERATIONS - 1 if largest >= SMALL_CORRECTION else 0):
+        state = self.process.displace(prior.state, gain.correction)
+        last = gain
+        for _ in range(ITERATIONS - 1 if gain.largest >= SMALL_CORRECTION else 0):
             seen = self.innovation(measurement, state)
+            seen = seen if believed.all() else seen.kept(believed)
             from_prior = self.process.difference(prior.state, state)
-            y = seen.y + seen.H @ from_prior[: seen.H.shape[1]]
-            innovate(U, seen.H, seen.noise, y, T, scratch, correction)
-            state = self.process.displace(prior.state, correction)
-            if np.max(np.abs(correction - from_prior)) < 1e-3 * SMALL_CORRECTION:
+            last = gain_of(U, replace(seen, y=seen.y + seen.H @ from_prior[: seen.H.shape[1]]))
+            state = self.process.displace(prior.state, last.correction)
+            if np.max(np.abs(last.correction - from_prior)) < 1e-3 * SMALL_CORRECTION:
                 break
-        factor = np.array(T[m:, m:]).T
-        self.constrain(state, factor)
+        self.constrain(state, last.factor)
         return Posterior(
             prior.stamp,
             state,
-            factor,
+            last.factor,
             accepted=prior.stamp,
             used=True,
-            nis=nis,
-            dimension=m,
-            log_determinant=determinant,
+            nis=gain.nis,
+            dimension=len(seen.y),
+            log_determinant=gain.log_determinant,
             begun=prior.begun,
             holds=self.simulator.switches.holds,
             trouble=prior.trouble,

@@ -62,8 +62,13 @@ class PointsMeasurement(Measurement):
         points = np.array(self.points, dtype=float)
         if points.ndim != 2 or points.shape[1] != 3:
             raise MeasurementError(f"points have shape {points.shape}: give (n, 3) metres")
-        _finite("points", points[~np.isnan(points).any(axis=1)], None)
         _set(self, "points", points)
+        _finite("points", points[self.seen], None)
+
+    @property
+    def seen(self) -> np.ndarray:
+        """Indices of the markers that were seen."""
+        return np.flatnonzero(~np.isnan(self.points).any(axis=1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """Observation models: what a state lets a source see, how that depends on the state, and how noisy it is."""
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -51,11 +51,37 @@ class Innovation:
         y: (m,) measured less expected.
         H: (m, nv) derivative of what is expected by the tangent of q.
         noise: (m, m) lower factor of the measurement's covariance.
+        block: how many rows are believed or refused together; the noise of such blocks is independent.
     """
 
     y: np.ndarray
     H: np.ndarray
     noise: np.ndarray
+    block: int
+
+    def kept(self, blocks: np.ndarray) -> "Innovation":
+        """Only some of its blocks, (m / block,) of bool."""
+        rows = np.repeat(blocks, self.block)
+        return Innovation(self.y[rows], self.H[rows], self.noise[np.ix_(rows, rows)], self.block)
+
+    def whitened(self) -> tuple[np.ndarray, np.ndarray]:
+        """H and y in standard deviations of the noise, and independent of each other."""
+        own = self._own_noise()
+        H = np.linalg.solve(own, self.H.reshape(len(own), self.block, -1))
+        return H.reshape(self.H.shape), np.linalg.solve(own, self.y.reshape(-1, self.block, 1)).ravel()
+
+    def squares(self, S: np.ndarray) -> np.ndarray:
+        """(m / block,) normalised innovation squared of each block alone; S (n, n) factor of the state's covariance."""
+        b, own = self.block, self._own_noise()
+        spread = (self.H @ S[: self.H.shape[1]]).reshape(-1, b, S.shape[1])
+        covariance = spread @ spread.transpose(0, 2, 1) + own @ own.transpose(0, 2, 1)
+        y = self.y.reshape(-1, b, 1)
+        return np.asarray((y.transpose(0, 2, 1) @ np.linalg.solve(covariance, y))[:, 0, 0])
+
+    def _own_noise(self) -> np.ndarray:
+        """(m / block, block, block) factors of the noise of each block."""
+        each = np.arange(len(self.y) // self.block)
+        return self.noise.reshape(len(each), self.block, len(each), self.block)[each, :, each, :]
 
 
 FITS = {
@@ -94,21 +120,22 @@ def innovation(source: MeasurementSource, measurement: Measurement, simulator: S
         y, H = _frame_seen(simulator, source, source.scale * measurement.position, measurement.orientation)
         if measurement.covariance is not None:
             to_metres = np.repeat([source.scale, 1.0], 3)
-            return Innovation(y, H, to_metres[:, None] * np.linalg.cholesky(measurement.covariance))
-        return Innovation(y, H, _alike(3, source.position_noise, source.orientation_noise))
+            return Innovation(y, H, to_metres[:, None] * np.linalg.cholesky(measurement.covariance), 6)
+        return Innovation(y, H, _alike(3, source.position_noise, source.orientation_noise), 6)
     if isinstance(source, OrientationSource) and isinstance(measurement, OrientationMeasurement):
         y, H = _frame_seen(simulator, source, NOWHERE, measurement.orientation)
         if measurement.covariance is not None:
-            return Innovation(y[3:], H[3:], np.linalg.cholesky(measurement.covariance))
-        return Innovation(y[3:], H[3:], _alike(3, source.orientation_noise))
+            return Innovation(y[3:], H[3:], np.linalg.cholesky(measurement.covariance), 3)
+        return Innovation(y[3:], H[3:], _alike(3, source.orientation_noise), 3)
     if isinstance(source, PointsSource) and isinstance(measurement, PointsMeasurement):
-        seen = np.flatnonzero(~np.isnan(measurement.points).any(axis=1))
+        seen = measurement.seen
         y, H = np.empty(3 * len(seen)), np.empty((3 * len(seen), simulator.nv))
         links, places = _markers(simulator, source)
         scratch = np.empty((6, simulator.nv))
         memory = simulator.memory
         see_points(memory.links, memory.work, links[seen], places[seen], measurement.points[seen], y, H, scratch)
-        return Innovation(y, H, _alike(len(y), source.noise))
+        noise = tuple(source.markers[index].noise or source.noise for index in seen)
+        return Innovation(y, H, _alike(3, *noise), 3)
     assert isinstance(source, JointSource)
     assert isinstance(measurement, JointsMeasurement)
     y, H = np.zeros(len(measurement.names)), np.zeros((len(measurement.names), simulator.nv))
@@ -118,7 +145,7 @@ def innovation(source: MeasurementSource, measurement: Measurement, simulator: S
         if link.joint.kind is JointKind.REVOLUTE:  # an encoder may wrap where it likes
             y[row] = (y[row] + np.pi) % (2.0 * np.pi) - np.pi
         H[row, link.v] = 1.0
-    return Innovation(y, H, _alike(len(y), source.noise))
+    return Innovation(y, H, _alike(len(y), source.noise), max(len(y), 1))
 
 
 @kernel
@@ -183,7 +210,7 @@ def _markers(simulator: Simulator, source: PointsSource) -> tuple[np.ndarray, np
     return np.array([link for link, _, _ in frames]), np.array([place for _, place, _ in frames])
 
 
-@cache
+@lru_cache(maxsize=64)  # which markers are seen changes from frame to frame
 def _alike(count: int, *deviations: float) -> np.ndarray:
     """The lower factor of independent noise, ``count`` numbers of each deviation."""
     return np.diag(np.repeat(deviations, count))

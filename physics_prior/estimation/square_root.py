@@ -70,6 +70,17 @@ def innovate(
     return nis, determinant, largest
 
 
+def compressed(H: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """As few rows as H has columns that tell the same: whitened H (m, h), y (m,) -> Q^T H (h, h), Q^T y (h,) and what is left.
+
+    The rest of Q^T y, of the squared length that is returned, does not depend on the state (Bierman 1977, ch. 4).
+    """
+    m, h = H.shape
+    T = np.column_stack([H, y])
+    triangularise(T, h + 1, np.empty(m + h + 1))
+    return np.ascontiguousarray(T[:h, :h]), T[:h, h].copy(), float(T[h, h] ** 2)
+
+
 def deviations(S: np.ndarray) -> np.ndarray:
     """(n,) standard deviations of a factor S (n, n), to scale by: none less than rounding makes of the largest."""
     own = np.sqrt(np.sum(S * S, axis=1))

@@ -1,15 +1,18 @@
 """Cold start: a state from measurements alone."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
-from physics_prior.estimation.filter import Filter, Posterior
-from physics_prior.estimation.measurement import Measurement
+from physics_prior import rotations
+from physics_prior.estimation.filter import QUORUM, Filter, Posterior
+from physics_prior.estimation.measurement import Measurement, PointsMeasurement
+from physics_prior.estimation.process import State
 from physics_prior.estimation.square_root import lower_factor
 from physics_prior.estimation.switching import switch
 from physics_prior.model import JointKind, Tree
+from physics_prior.scene import PointsSource
 
 ITERATIONS = 30
 CONVERGED = 1e-9  # rad or m, or of the largest coordinate
@@ -17,6 +20,7 @@ LARGEST_TURN = 1.0  # rad in one iteration: beyond it a linearisation says nothi
 OBSERVABLE = 1e-6  # least relative singular value of the whitened measurements by a freedom
 TRIES = 6  # starting configurations: the scene's own, then random ones (always the same)
 SPREAD = 1.0  # rad or m
+NEARLY = 0.25  # of the square of the furthest marker's distance
 
 
 def start(
@@ -28,7 +32,8 @@ def start(
 ) -> Posterior | None:
     """A posterior at a stamp (ns) from measurements taken as simultaneous; None if they do not fix the configuration.
 
-    Gauss-Newton from several configurations; the best must fit all measurements within the gate's probability. The
+    Gauss-Newton from several configurations; the best must fit all measurements within the gate's probability, of a frame of
+    markers at least half of them, each by itself; the others are not believed. The
     velocity is zero with the scene's standard deviation. begun (ns): the scene's time zero, the stamp where left out;
     active: what holds, as scheduled where left out.
     """
@@ -38,20 +43,19 @@ def start(
         active = [effect.active_at((stamp - begun) * 1e-9) for effect in simulator.switches.effects]
     _enter_start(filter, stamp, begun, active)
     rng = np.random.default_rng(0)
-    best: tuple[float, np.ndarray, np.ndarray, int] | None = None
+    best: Fit | None = None
     for trial in range(TRIES):
         q = filter.scene.initial.q.copy()
         if trial > 0:
             q = simulator.tree.integrate(q, SPREAD * rng.normal(size=simulator.nv))
-        fit = _gauss_newton(filter, measurements, q)
-        if fit is not None and (best is None or fit[0] < best[0]):
+        fit = _fit(filter, measurements, registered(filter, measurements, q))
+        if fit is not None and (best is None or fit.excess < best.excess):
             best = fit
-            if _plausible(filter, fit[0], fit[3]):
+            if fit.excess <= 1.0:
                 break
-    if best is None or not _plausible(filter, best[0], best[3]):
+    if best is None or best.excess > 1.0:
         return None
-    _, q, factor_q, _ = best
-    return posterior_at(filter, q, factor_q, stamp, begun, active)
+    return posterior_at(filter, _unwound(filter, best.q), best.factor, stamp, begun, active)
 
 
 def posterior_at(
@@ -91,24 +95,111 @@ def _enter_start(filter: Filter, stamp: int, begun: int, active: Sequence[bool])
     simulator.switches.holds = simulator.switches.told(active)
 
 
-def _plausible(filter: Filter, cost: float, freedom: int) -> bool:
-    """Whether residuals of this squared length fit that many redundant rows."""
-    return freedom <= 0 or cost <= float(chi2.ppf(filter.scene.gate.probability, freedom))
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A configuration q (nq,), the factor (nv, nv) of its covariance, and how bad it is: above 1 beyond the gate."""
+
+    q: np.ndarray
+    factor: np.ndarray
+    excess: float
+
+
+def registered(filter: Filter, measurements: Sequence[Measurement], q: np.ndarray) -> np.ndarray:
+    """Return q (nq,) with each free body put where its markers are: by the nearest rigid motion (Arun et al. 1987).
+
+    Whoever faces away from where the scene begins would otherwise start half a turn off, and Gauss-Newton may not find home.
+    """
+    simulator, q = filter.simulator, q.copy()
+    links = simulator.tree.links
+    seen: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
+    simulator.move(q, np.zeros(simulator.nv))
+    for measurement in measurements:
+        source = filter.sources[measurement.topic]
+        if not isinstance(source, PointsSource) or not isinstance(measurement, PointsMeasurement):
+            continue
+        for index in measurement.seen:
+            marker = source.markers[index]
+            root = simulator.tree.frame(marker.part).link
+            while root >= 0 and links[root].parent >= 0:
+                root = links[root].parent
+            if root >= 0 and links[root].joint.kind is JointKind.FREE:
+                position, R = simulator.pose(marker.part)
+                seen.setdefault(root, []).append((position + R @ np.array(marker.point), measurement.points[index]))
+    for root, pairs in seen.items():
+        if len(pairs) >= 3:
+            here, there = (np.array(points) for points in zip(*pairs, strict=True))
+            U, _, Vt = np.linalg.svd((there - there.mean(axis=0)).T @ (here - here.mean(axis=0)))
+            R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+            position, orientation = q[links[root].q][:3], q[links[root].q][3:]
+            position[:] = there.mean(axis=0) + R @ (position - here.mean(axis=0))
+            orientation[:] = rotations.multiply(rotations.quaternion_from_matrix(R), orientation)
+    return q
+
+
+def _fit(filter: Filter, measurements: Sequence[Measurement], q: np.ndarray) -> Fit | None:
+    """The best fit from q; None if not observable or not found.
+
+    Where markers lie beyond the gate, those that do so nearly as far as the furthest are left out, and again, down to the quorum.
+    """
+    measurements = list(measurements)
+    fewest = {index: QUORUM * _count(each) for index, each in enumerate(measurements) if _count(each) > 1}
+    while True:
+        found = _gauss_newton(filter, measurements, q)
+        if found is None:
+            return None
+        q, factor, cost, redundancy, converged = found
+        if not fewest:
+            excess = cost / filter.gate_limit(redundancy) if redundancy > 0 else 0.0
+            return Fit(q, factor, excess) if converged else None
+        state = filter.process.start(q, np.zeros(filter.simulator.nv))
+        apart = [_excess(filter, each, state) for each in measurements]
+        worst = max(float(np.max(each, initial=0.0)) for each in apart)
+        if worst <= 1.0:
+            return Fit(q, factor, worst) if converged else None
+        before = sum(map(_count, measurements))
+        for index, least in fewest.items():
+            measurements[index] = _without(measurements[index], apart[index] > max(1.0, NEARLY * worst))
+            if _count(measurements[index]) < least:
+                return None
+        if sum(map(_count, measurements)) == before:
+            return None
+
+
+def _count(measurement: Measurement) -> int:
+    """How many markers a frame of them saw; 0 of anything else."""
+    return len(measurement.seen) if isinstance(measurement, PointsMeasurement) else 0
+
+
+def _excess(filter: Filter, measurement: Measurement, state: State) -> np.ndarray:
+    """How far each seen marker, or all that was measured, is from where the state has it: squared, over what the gate allows."""
+    seen = filter.innovation(measurement, state)
+    _, y = seen.whitened()
+    return np.asarray(np.sum(y.reshape(-1, seen.block) ** 2, axis=1) / filter.gate_limit(seen.block))
+
+
+def _without(measurement: Measurement, left_out: np.ndarray) -> Measurement:
+    """A frame of markers without some of those that it saw, (seen,) bool."""
+    assert isinstance(measurement, PointsMeasurement)
+    points = measurement.points.copy()
+    points[measurement.seen[left_out]] = np.nan
+    return replace(measurement, points=points)
 
 
 def _gauss_newton(
     filter: Filter, measurements: Sequence[Measurement], q: np.ndarray
-) -> tuple[float, np.ndarray, np.ndarray, int] | None:
-    """Cost, configuration, covariance factor and redundancy of the best fit from q; None if not observable or not found."""
+) -> tuple[np.ndarray, np.ndarray, float, int, bool] | None:
+    """Configuration, covariance factor, cost, redundancy of the best fit from q, and whether found; None if not observable."""
     simulator, v = filter.simulator, np.zeros(filter.simulator.nv)
     turning = _turning(simulator.tree)
-    state = filter.process.start(q, v)
+    state = filter.process.start(q.copy(), v)
+    converged = True
     for _ in range(ITERATIONS):
         rows, errors = [np.zeros((0, simulator.nv))], [np.zeros(0)]
         for measurement in measurements:
             seen = filter.innovation(measurement, state)
-            rows.append(np.linalg.solve(seen.noise, seen.H))
-            errors.append(np.linalg.solve(seen.noise, seen.y))
+            own_rows, own_errors = seen.whitened()
+            rows.append(own_rows)
+            errors.append(own_errors)
         H, y = np.concatenate(rows), np.concatenate(errors)
         basis = _free_directions(filter, state.q)
         if len(H) == 0:
@@ -123,10 +214,20 @@ def _gauss_newton(
         if np.max(np.abs(step)) < CONVERGED * max(1.0, float(np.max(np.abs(state.q)))):
             break
     else:
-        return None
+        converged = False
     factor = np.zeros((simulator.nv, simulator.nv))
     factor[:, : basis.shape[1]] = basis @ V.T / s
-    return float(y @ y - np.sum((U.T @ y) ** 2)), state.q, lower_factor(factor), len(y) - basis.shape[1]
+    cost = float(y @ y - np.sum((U.T @ y) ** 2))
+    return state.q, lower_factor(factor), cost, len(y) - basis.shape[1], converged
+
+
+def _unwound(filter: Filter, q: np.ndarray) -> np.ndarray:
+    """Return q (nq,) with each hinge within half a turn of where the scene begins: what is measured tells no full turns."""
+    q, begin = q.copy(), filter.scene.initial.q
+    for link in filter.simulator.tree.links:
+        if link.joint.kind is JointKind.REVOLUTE:
+            q[link.q] -= 2.0 * np.pi * np.round((q[link.q] - begin[link.q]) / (2.0 * np.pi))
+    return q
 
 
 def _turning(tree: Tree) -> np.ndarray:

@@ -195,7 +195,7 @@ def _measure(
         points = []
         for marker in source.markers:
             position, R = simulator.pose(marker.part)
-            points.append(position + R @ np.array(marker.point) + source.noise * noise.normal(size=3))
+            points.append(position + R @ np.array(marker.point) + (marker.noise or source.noise) * noise.normal(size=3))
         return PointsMeasurement(stamp, source.topic, np.array(points))
     assert isinstance(source, JointSource)
     true = np.array([q[simulator.tree.link(joint).q.start] for joint in source.joints.values()])

@@ -1,6 +1,7 @@
 """Model, effects, measurements, noise and readouts of one scene, read from one file."""
 
 from physics_prior.scene.loader import build_scene, load_scene
+from physics_prior.scene.marker_sets import MarkerSet, NominalMarker, load_marker_set
 from physics_prior.scene.measurements import (
     JointSource,
     Marker,
@@ -31,8 +32,10 @@ __all__ = [
     "JointReadout",
     "JointSource",
     "Marker",
+    "MarkerSet",
     "MeasurementSource",
     "Noise",
+    "NominalMarker",
     "OrientationSource",
     "PointReadout",
     "PointsSource",
@@ -44,5 +47,6 @@ __all__ = [
     "Step",
     "SwitchSource",
     "build_scene",
+    "load_marker_set",
     "load_scene",
 ]

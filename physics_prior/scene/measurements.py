@@ -58,15 +58,16 @@ class OrientationSource(_PartSource):
 
 
 class Marker(Section):
-    """A named point, m, of a part."""
+    """A named point, m, of a part; its own noise, m, if it is not that of all."""
 
     name: Name
     part: str
     point: Position = (0.0, 0.0, 0.0)
+    noise: PositiveLength | None = None
 
 
 class PointsSource(MeasurementSource):
-    """Positions of markers in the world, in the order of the PoseArray; a marker of NaN is not seen."""
+    """Positions of markers in the world, in the order of the PoseArray; a marker of NaN is not seen. Each is gated by itself."""
 
     message_types = ("geometry_msgs/msg/PoseArray",)
 

@@ -1,7 +1,8 @@
 """Time the kernels on a human-like tree of 16 bodies and 35 degrees of freedom, alone or against other engines.
 
 With --peers, Pinocchio and MuJoCo (their PyPI wheels, extra 'bench') take turns with ours in one run on one core; a ratio
-above 1 means that we are faster. Before anything is timed, the engines' results are compared.
+above 1 means that we are faster. Before anything is timed, the engines' results are compared. Then the estimator, predict and
+update with its covariance, on the same tree in motion: its split, and, where biorbd is installed, that one's Kalman filter.
 
 With --effects, each built-in effect is taken out of a copy of the program instead, and a scene that does not name it is compiled
 and run in both: the same bits, the same instructions. Takes some two to three minutes.
@@ -19,7 +20,7 @@ from physics_prior.commands.terminal import STDOUT, console, progress, require_f
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the arguments of `bench`."""
-    parser.add_argument("--peers", action="store_true", help="time Pinocchio and MuJoCo too")
+    parser.add_argument("--peers", action="store_true", help="time Pinocchio, MuJoCo and biorbd too")
     parser.add_argument(
         "--effects", action="store_true", help="show that effects cost nothing where they are not named"
     )
@@ -31,14 +32,16 @@ def run(args: argparse.Namespace) -> int:
     require_folder("--json", args.json)
     if args.effects:
         return _effects(args)
+    from physics_prior.studies import bench_estimator
     from physics_prior.studies.bench import run_bench, table
 
     with progress("timing") as report:
-        figures = run_bench(args.peers, lambda done, total: report(done / total))
+        figures = run_bench(args.peers, report)
     if args.json is not None:
         write_json(args.json, figures)
     if args.json != STDOUT:
         console().print(table(figures))
+        console().print(bench_estimator.table(figures))
     return 0
 
 

@@ -200,19 +200,21 @@ class Estimator:
     @property
     def _newest(self) -> int:
         """Stamp of the newest measurement, ns; 0 before the first."""
+        if self.history:
+            return self.history.nodes[-1].measurement.stamp
         waiting = (each.stamp for each in reversed(self._early) if not isinstance(each, SwitchCommand))
-        return self.stamp or next(waiting, 0)
+        return next(waiting, 0)
 
     def _misplaced(self, measurement: Measurement) -> str:
         """Why a measurement finds no place; empty if it does."""
-        key, history = self.filter.key(measurement), self.history
+        key, history, newest = self.filter.key(measurement), self.history, self._newest
         if history.holds(measurement) or key in map(self.filter.key, self._early):
             return "was doubled"
         if isinstance(measurement, SwitchCommand) and not history:
             return ""
-        if (measurement.stamp - self._newest) * 1e-9 > self.scene.health.lost_after and history:
+        if (measurement.stamp - newest) * 1e-9 > self.scene.health.lost_after and history:
             return "is so far ahead of all others that the estimate would be lost by then"
-        oldest = self._newest - START_WINDOW
+        oldest = newest - START_WINDOW
         if history:
             oldest = history.nodes[0].measurement.stamp - START_WINDOW
             if not history.from_start and not history.reaches(measurement):

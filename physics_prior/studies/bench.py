@@ -24,8 +24,11 @@ from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects.attachment import Attachment
 from physics_prior.effects.gravity import Gravity
 from physics_prior.errors import PhysicsPriorError, SimulationError
+from physics_prior.studies.bench_estimator import RATIOS as ESTIMATOR_RATIOS
+from physics_prior.studies.bench_estimator import time_estimator
 from physics_prior.studies.bench_models import HELD_FEET, PinocchioModel, humanlike, mjcf
 
+KERNELS_SHARE = 0.3  # of the time; the rest is the estimator's
 ROUNDS, CALLS = 200, 40  # a round times every contestant once, over so many calls
 STEP_SIZE = 1e-3  # s
 AGREEMENT = 1e-9  # relative: engines that differ by more do not compute the same
@@ -174,12 +177,12 @@ class Peers:
             _require("mujoco.mj_forward", free_data.qacc, free)
 
 
-def run_bench(peers: bool, progress: Callable[[int, int], None] = lambda done, total: None) -> dict[str, Any]:
+def run_bench(peers: bool, progress: Callable[[float], None] = lambda share: None) -> dict[str, Any]:
     """Time ours, and with ``peers`` the others; return ``ratios``, ``us`` (medians, microseconds a call) and ``machine``.
 
     Args:
-        peers: whether Pinocchio and MuJoCo take part.
-        progress: is told after every round how many of how many are done.
+        peers: whether Pinocchio and MuJoCo, and biorbd where it is installed, take part.
+        progress: is told the share that is done.
 
     Raises:
         PhysicsPriorError: ``pin`` or ``mujoco`` is not installed.
@@ -198,8 +201,9 @@ def run_bench(peers: bool, progress: Callable[[int, int], None] = lambda done, t
         contestants |= theirs.contestants()
         restarts.append(theirs.restart)
     with _one_core():
-        us = _medians(contestants, restarts, progress)
-    ratios = {name: us[peer] / us[own] for name, (own, peer) in RATIOS.items() if peer in us}
+        us = _medians(contestants, restarts, lambda done, total: progress(KERNELS_SHARE * done / total))
+        us |= time_estimator(peers, lambda share: progress(KERNELS_SHARE + (1.0 - KERNELS_SHARE) * share))
+    ratios = {name: us[peer] / us[own] for name, (own, peer) in (RATIOS | ESTIMATOR_RATIOS).items() if peer in us}
     return {"ratios": ratios, "us": us, "machine": _machine(peers)}
 
 

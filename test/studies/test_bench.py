@@ -1,6 +1,7 @@
 """The benchmark's machinery: its figures, its refusals, the tree it runs on. Nothing here asks how fast anything is."""
 
 import json
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from physics_prior import cli
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.errors import PhysicsPriorError, SimulationError
-from physics_prior.studies import bench
+from physics_prior.studies import bench, bench_estimator
 from physics_prior.studies.bench_models import HELD_FEET, humanlike, mjcf
 
 NAMES = {
@@ -21,9 +22,12 @@ NAMES = {
 
 @pytest.fixture
 def short(monkeypatch):
-    """Two rounds of two calls."""
+    """Two rounds of two calls, half a second of an estimator."""
     monkeypatch.setattr(bench, "ROUNDS", 2)
     monkeypatch.setattr(bench, "CALLS", 2)
+    monkeypatch.setattr(bench_estimator, "SECONDS", 0.5)
+    monkeypatch.setattr(bench_estimator, "PENDULUM_SECONDS", 0.5)
+    monkeypatch.setattr(bench_estimator, "LAPS", 1)
 
 
 def test_tree_has_16_bodies_and_35_degrees_of_freedom():
@@ -34,11 +38,14 @@ def test_tree_has_16_bodies_and_35_degrees_of_freedom():
 
 def test_figures_of_ours_alone(short):
     told = []
-    figures = bench.run_bench(False, lambda done, total: told.append((done, total)))
+    figures = bench.run_bench(False, told.append)
+    us = figures["us"]
     assert figures["ratios"] == {}
-    assert set(figures["us"]) == {own for own, _ in bench.RATIOS.values()}
-    assert all(us > 0.0 for us in figures["us"].values())
-    assert told == [(1, 2), (2, 2)]
+    assert {own for own, _ in bench.RATIOS.values()} < set(us)
+    assert all(value > 0.0 for value in us.values())
+    assert {f"estimator_poses_{name}" for name in bench_estimator.SPLIT} < set(us)
+    assert told == sorted(told)
+    assert told[-1] == 1.0
 
 
 def test_command_writes_figures_and_a_table(short, tmp_path, capsys):
@@ -46,14 +53,16 @@ def test_command_writes_figures_and_a_table(short, tmp_path, capsys):
     assert cli.main(["bench", "--json", str(path)]) == 0
     figures = json.loads(path.read_text())
     assert set(figures) == {"ratios", "us", "machine"}
-    assert "forward dynamics" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "forward dynamics" in out
+    assert "48 markers" in out
 
 
 def test_peers_agree_and_give_ratios(short):
     pytest.importorskip("pinocchio", reason="Pinocchio (extra 'bench') is not installed")
     pytest.importorskip("mujoco", reason="MuJoCo (extra 'bench') is not installed")
     figures = bench.run_bench(True)
-    assert set(figures["ratios"]) == NAMES
+    assert set(figures["ratios"]) == NAMES | (set(bench.ESTIMATOR_RATIOS) if find_spec("biorbd") else set())
     for name, (own, peer) in bench.RATIOS.items():
         assert figures["ratios"][name] == figures["us"][peer] / figures["us"][own]
 

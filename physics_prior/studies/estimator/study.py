@@ -1,0 +1,159 @@
+"""Run every variant on simulated recordings: error, consistency and force error against microseconds a measurement."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from time import thread_time_ns
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from physics_prior.errors import PhysicsPriorError
+from physics_prior.estimation.estimator import Estimator
+from physics_prior.estimation.filter import Posterior
+from physics_prior.estimation.history import Node
+from physics_prior.estimation.smoother import smooth
+from physics_prior.estimation.square_root import normalised_error
+from physics_prior.model import JointKind
+from physics_prior.recording.simulate import Moment
+from physics_prior.scene import Scene
+from physics_prior.studies.estimator.variants import PROBLEMS, VARIANTS, Variant
+from physics_prior.studies.moving_human import moments
+
+SECONDS, SETTLED = 8.0, 0.4  # s, and s of the beginning that do not count
+SMOOTHED_EVERY = 10  # stamps: of what a lag is for, a sample
+FOREVER = 1e6  # s
+PAYING = 1.02  # times the least error of the same measurements: below it, noise is all that is left
+
+
+@dataclass(frozen=True)
+class Point:
+    """What a variant costs and gives on a problem.
+
+    Attributes:
+        us: microseconds of the processor a measurement, the median, and what smoothing adds at every stamp.
+        rmse_deg: of all turning freedoms, deg.
+        nees: normalised estimation error squared over its degrees of freedom: 1 where the covariance is right.
+        force_percent: error of the joints' forces, percent of the weight; nan where the process knows none.
+    """
+
+    problem: str
+    series: str
+    label: str
+    us: float
+    rmse_deg: float
+    nees: float
+    force_percent: float
+
+
+def run_study(names: Sequence[str], seed: int, progress: Callable[[float], None]) -> list[Point]:
+    """Measure every variant on problems by name; all where none is given.
+
+    Raises:
+        PhysicsPriorError: a name that is none; SimulationError: a motion that cannot be computed.
+    """
+    for name in names:
+        if name not in PROBLEMS:
+            raise PhysicsPriorError(f"problem '{name}' is unknown: known are {list(PROBLEMS)}")
+    chosen, out = names or list(PROBLEMS), []
+    for index, name in enumerate(chosen):
+        scene = PROBLEMS[name]()
+        recording = moments(scene, SECONDS, seed)
+        for done, variant in enumerate(VARIANTS):
+            out.append(measure(name, scene, variant, recording))
+            progress((index + (done + 1) / len(VARIANTS)) / len(chosen))
+    return out
+
+
+def measure(name: str, scene: Scene, variant: Variant, recording: Sequence[Moment]) -> Point:
+    """Run one variant on a recording."""
+    estimator = Estimator(variant.of(scene), variant.process, FOREVER)
+    measured = recording[:: variant.every]
+    for moment in measured[:2]:  # what is not compiled yet is now
+        for measurement in moment.measurements:
+            estimator.add(measurement)
+    estimator = Estimator(variant.of(scene), variant.process, FOREVER)
+    times = []
+    for moment in measured:
+        start = thread_time_ns()
+        for measurement in moment.measurements:
+            estimator.add(measurement)
+        times.append((thread_time_ns() - start) / 1e3 / len(moment.measurements))
+    last, smoothing = {node.measurement.stamp: node.posterior for node in estimator.history.nodes}, 0.0
+    if variant.lag > 0.0:
+        start = thread_time_ns()
+        last = _smoothed(estimator, variant.lag)
+        smoothing = (thread_time_ns() - start) / 1e3 / len(last) / len(measured[0].measurements)
+    true = {moment.stamp: moment for moment in measured}
+    begun = recording[0].stamp + round(SETTLED * 1e9)
+    pairs = [(true[stamp], posterior) for stamp, posterior in last.items() if stamp >= begun]
+    rmse, nees, force = _errors(estimator, pairs)
+    return Point(name, variant.series, variant.label, float(np.median(times)) + smoothing, rmse, nees, force)
+
+
+def _smoothed(estimator: Estimator, lag: float) -> dict[int, Posterior]:
+    """Posteriors at a sample of the stamps, told by what was measured within the lag after them."""
+    nodes, out = estimator.history.nodes, {}
+    stamps = sorted({node.measurement.stamp for node in nodes})
+    for stamp in stamps[SMOOTHED_EVERY:-SMOOTHED_EVERY:SMOOTHED_EVERY]:
+        window: list[Node] = [node for node in nodes if stamp <= node.measurement.stamp <= stamp + round(lag * 1e9)]
+        out[stamp] = smooth(estimator.filter, window, FOREVER)[0]
+    return out
+
+
+def _errors(estimator: Estimator, pairs: Sequence[tuple[Moment, Posterior]]) -> tuple[float, float, float]:
+    """Root mean square error, deg; mean NEES over its degrees of freedom; force error, percent of the weight."""
+    simulator, process = estimator.simulator, estimator.filter.process
+    turning = np.zeros(simulator.nv, dtype=bool)
+    for link in simulator.tree.links:
+        turning[link.v][-3:] = link.joint.kind is not JointKind.PRISMATIC
+    squares, nees, freedom, forces = [], 0.0, 0, []
+    for moment, posterior in pairs:
+        state, n = posterior.state, 2 * simulator.nv
+        error = process.difference(state, process.start(moment.q, moment.v))[:n]
+        squares.append(error[: simulator.nv][turning] ** 2)
+        value, rank = normalised_error(posterior.factor[:n], error)
+        nees, freedom = nees + value, freedom + rank
+        if not len(state.acceleration):
+            estimator.filter.enter(posterior)
+            off = simulator.wrench_array(moment.q, moment.v) - simulator.wrench_array(state.q, state.v)
+            forces.append(np.sum(off[:, :3] ** 2, axis=1))
+    weight = simulator.tree.mass * 9.81
+    force = 100.0 * float(np.sqrt(np.mean(forces))) / weight if forces else float("nan")
+    return float(np.degrees(np.sqrt(np.mean(squares)))), nees / freedom, force
+
+
+def enough(points: Sequence[Point], problem: str) -> Point:
+    """The cheapest of a problem's steps whose error is that of the noise, within PAYING."""
+    own = [point for point in points if point.problem == problem and point.series in ("rk4", "semi_implicit_euler")]
+    least = min(point.rmse_deg for point in own)
+    return min((point for point in own if point.rmse_deg <= PAYING * least), key=lambda point: point.us)
+
+
+def card(points: Sequence[Point]) -> dict[str, Any]:
+    """Every figure, for JSON; None where there is none."""
+    rows = [{key: None if value != value else value for key, value in asdict(point).items()} for point in points]
+    problems = dict.fromkeys(point.problem for point in points)
+    return {"points": rows, "enough": {name: asdict(enough(points, name)) for name in problems}}
+
+
+def table(points: Sequence[Point]) -> Table:
+    """The figures for people; what is enough is marked."""
+    out = Table(
+        title=f"what accuracy costs the estimator; * is enough: cheapest within {100 * (PAYING - 1):.0f} % of the least error"
+    )
+    for column in ("problem", "by", "", "us a measurement", "RMSE, deg", "NEES", "force, % of weight"):
+        out.add_column(column, justify="left" if column in ("problem", "by") else "right")
+    for point in points:
+        mark = "*" if point == enough(points, point.problem) else ""
+        force = "" if np.isnan(point.force_percent) else f"{point.force_percent:.3g}"
+        out.add_row(
+            point.problem,
+            point.series,
+            point.label + mark,
+            f"{point.us:.0f}",
+            f"{point.rmse_deg:.4g}",
+            f"{point.nees:.2f}",
+            force,
+        )
+    return out

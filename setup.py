@@ -58,7 +58,7 @@ setup(
             "types-PyYAML",
         ],
         # oracles and peers of the kernels
-        "bench": ["pin", "mujoco"],
+        "bench": ["pin", "mujoco", "exudyn"],
     },
     entry_points={
         "console_scripts": [

@@ -21,6 +21,7 @@ COMMANDS = {
     "replay": ("physics_prior.commands.replay", "estimate motion and forces from a recording"),
     "effects": ("physics_prior.commands.effects", "tell which effects a recording calls for, and fit their numbers"),
     "stability": ("physics_prior.commands.stability", "run the hard cases on which engines break"),
+    "accuracy": ("physics_prior.commands.accuracy", "measure what accuracy costs in time, beside other engines"),
     "tradeoff": (
         "physics_prior.commands.tradeoff",
         "measure what accuracy costs the estimator, and how much is enough",

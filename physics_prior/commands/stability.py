@@ -11,11 +11,9 @@ Examples:
 """
 
 import argparse
-import os
 from pathlib import Path
 
-from physics_prior.commands.terminal import STDOUT, console, progress, require_folder, write_json
-from physics_prior.errors import PhysicsPriorError
+from physics_prior.commands.terminal import STDOUT, console, progress, require_folder, require_plot_folder, write_json
 
 PASSED, FAILED = 0, 1
 LINE_WIDTH = 260  # one line a case, where it is not a terminal that is narrower
@@ -32,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the cases; 0 if all pass, 1 if not."""
     require_folder("--json", args.json)
     if args.plot is not None:
-        _require_directory(args.plot)
+        require_plot_folder(args.plot)
     from physics_prior.studies.stability.registry import chosen
     from physics_prior.studies.stability.suite import figures, run_cases, table
 
@@ -49,13 +47,3 @@ def run(args: argparse.Namespace) -> int:
     if args.json != STDOUT:
         console(LINE_WIDTH).print(table(outcomes))
     return FAILED if found["failed"] else PASSED
-
-
-def _require_directory(path: Path) -> None:
-    """Make the folder for pictures, or refuse before any work."""
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise PhysicsPriorError(f"--plot {path}: {error.strerror}; give a folder") from None
-    if not os.access(path, os.W_OK):
-        raise PhysicsPriorError(f"--plot {path}: folder is not writable")

@@ -200,11 +200,11 @@ def run_bench(peers: bool, progress: Callable[[float], None] = lambda share: Non
         theirs = Peers(ours)
         contestants |= theirs.contestants()
         restarts.append(theirs.restart)
-    with _one_core():
+    with one_core():
         us = _medians(contestants, restarts, lambda done, total: progress(KERNELS_SHARE * done / total))
         us |= time_estimator(peers, lambda share: progress(KERNELS_SHARE + (1.0 - KERNELS_SHARE) * share))
     ratios = {name: us[peer] / us[own] for name, (own, peer) in (RATIOS | ESTIMATOR_RATIOS).items() if peer in us}
-    return {"ratios": ratios, "us": us, "machine": _machine(peers)}
+    return {"ratios": ratios, "us": us, "machine": machine(peers)}
 
 
 def table(figures: dict[str, Any]) -> Table:
@@ -243,7 +243,7 @@ def _medians(
 
 
 @contextmanager
-def _one_core() -> Iterator[None]:
+def one_core() -> Iterator[None]:
     """Stay on one core, where the system lets us choose."""
     if sys.platform != "linux":
         yield
@@ -256,7 +256,8 @@ def _one_core() -> Iterator[None]:
         os.sched_setaffinity(0, before)
 
 
-def _machine(peers: bool) -> dict[str, Any]:
+def machine(peers: bool) -> dict[str, Any]:
+    """Processor, Python and packages, those of Pinocchio and MuJoCo with peers."""
     packages = ("numpy", "numba", *(("pin", "mujoco") if peers else ()))
     return {
         "processor": _processor(),

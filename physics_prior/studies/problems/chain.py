@@ -2,16 +2,18 @@
 
 import numpy as np
 
-from physics_prior import inertia
+from physics_prior import inertia, rotations
+from physics_prior.dynamics.formulations.kinematics import kinematics
 from physics_prior.effects import Effect
 from physics_prior.effects.attachment import Attachment
 from physics_prior.effects.gravity import Gravity
 from physics_prior.errors import ModelError
 from physics_prior.inertia import MassProperties
 from physics_prior.model import Joint, JointKind, Part, Tree
-from physics_prior.studies.bench_models import humanlike
-from physics_prior.studies.problems.mechanism import Mechanism
+from physics_prior.studies.bench_models import HELD_FEET, humanlike
+from physics_prior.studies.problems.mechanism import Benchmark, Mechanism
 from physics_prior.studies.problems.pendulum import DOWN
+from physics_prior.studies.problems.reference_values import HELD_HUMAN
 
 GRAVITY = Gravity(acceleration=(0.0, 0.0, -9.81))
 
@@ -61,6 +63,29 @@ def thrown_human() -> Mechanism:
     tree = humanlike()
     v = 2.0 * np.cos(np.arange(tree.nv))
     return Mechanism(tree, (GRAVITY,), tree.integrate(tree.neutral(), 0.3 * np.sin(np.arange(tree.nv))), v)
+
+
+def held_human() -> Benchmark:
+    """The same let go at rest on both feet, whose toes are pinned where they stand; the head at every 0.05 s to 0.5 s."""
+    tree = humanlike()
+    q = tree.integrate(tree.neutral(), 0.3 * np.sin(np.arange(tree.nv)))
+    where = kinematics(tree, q, np.zeros(tree.nv))
+    pins = []
+    for anchor in HELD_FEET:
+        link = tree.frame(anchor.part).link
+        at = where.position[link] + rotations.rotate(where.orientation[link], anchor.point)
+        pins.append(
+            Attachment(name=f"{anchor.part}_pin", part=anchor.part, point=tuple(anchor.point), at=tuple(at.tolist()))
+        )
+    return Benchmark(
+        tree,
+        (GRAVITY, *pins),
+        q,
+        np.zeros(tree.nv),
+        observe=lambda run: run.point("head", (0.0, 0.0, 0.0)),
+        times=HELD_HUMAN[:, 0],
+        values=HELD_HUMAN[:, 1:],
+    )
 
 
 def scaled(mechanism: Mechanism, length: float, mass: float) -> Mechanism:

@@ -1,0 +1,126 @@
+"""Runs the schemes of a problem in turns, and tells error, energy, residual and cost of each setting."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from physics_prior.dynamics.simulator import Simulator
+from physics_prior.errors import SimulationError
+from physics_prior.studies.accuracy.problem import Problem
+from physics_prior.studies.accuracy.trajectory import LONGEST, Scheme, Setting, Trajectory
+from physics_prior.studies.problems.mechanism import Benchmark, Run
+
+ROUNDS = 3  # of timing, all contestants in turns
+REPEATED = 0.3  # s of processor time, beyond which a run is not repeated
+
+
+@dataclass(frozen=True)
+class Point:
+    """One scheme at one setting on one problem.
+
+    Attributes:
+        engine, scheme, h, tolerance: which.
+        error: largest distance from the reference, in the problem's unit; None where the motion was lost.
+        energy: largest change of energy less work done, J; None where it does not stay, or is not told.
+        residual: how far what holds was off at most, m.
+        seconds: processor time per simulated second, the median.
+        real_time: simulated over processor time.
+    """
+
+    engine: str
+    scheme: str
+    h: float
+    tolerance: float | None
+    error: float | None
+    energy: float | None
+    residual: float | None
+    seconds: float | None
+    real_time: float | None
+
+    def figures(self) -> dict[str, Any]:
+        """As plain data."""
+        return asdict(self)
+
+
+def measure(
+    problem: Problem,
+    schemes: Sequence[Scheme],
+    progress: Callable[[float], None] = lambda fraction: None,
+    rounds: int = ROUNDS,
+) -> list[Point]:
+    """Every scheme at all of its settings; those too slow are left out, as those finer than one too slow are."""
+    benchmark = problem.make()
+    judge = Judge(problem, benchmark)
+    duration = float(benchmark.times[-1])
+    points: dict[tuple[int, Setting], Point] = {}
+    times: dict[tuple[int, Setting], list[float]] = {}
+    for index, scheme in enumerate(schemes):
+        expected = 0.0
+        for place, setting in enumerate(scheme.settings):
+            if place and setting.tolerance is None:
+                expected *= scheme.settings[place - 1].h / setting.h
+            if expected > LONGEST:
+                break
+            try:
+                found = scheme.trajectory(benchmark, setting)
+            except SimulationError:
+                points[index, setting] = judge.lost(scheme, setting)
+                continue
+            expected = found.seconds
+            if found.q is None:
+                break
+            points[index, setting] = judge.point(scheme, setting, found)
+            if points[index, setting].error is not None:
+                times[index, setting] = []
+        progress((index + 1) / len(schemes) * 0.5)
+    # the runs above have warmed everything up; these are those that count
+    for done in range(rounds):
+        for (index, setting), taken in times.items():
+            if not taken or taken[0] < REPEATED:
+                taken.append(schemes[index].trajectory(benchmark, setting).seconds)
+        progress(0.5 + 0.5 * (done + 1) / rounds)
+    return [_timed(point, median(times[key]) / duration) if key in times else point for key, point in points.items()]
+
+
+class Judge:
+    """What is right: the reference, the energy at the start, and our constraints."""
+
+    def __init__(self, problem: Problem, benchmark: Benchmark) -> None:
+        self._problem, self._benchmark = problem, benchmark
+        simulator = Simulator(benchmark.tree, benchmark.effects)
+        self._run = Run(simulator, benchmark.q.copy(), benchmark.v.copy())
+        self._start = self._run.energy()
+
+    def point(self, scheme: Scheme, setting: Setting, found: Trajectory) -> Point:
+        """The figures of a trajectory, without its time."""
+        assert found.q is not None
+        if not np.all(np.isfinite(found.q)):
+            return self.lost(scheme, setting)
+        error, energy, residual = 0.0, 0.0, 0.0
+        tells_energy = found.v is not None and self._problem.conservative
+        for k, value in enumerate(self._benchmark.values):
+            self._run.q[:] = found.q[k]
+            self._run.v[:] = self._benchmark.v if found.v is None else found.v[k]
+            error = max(error, self._benchmark.distance(self._benchmark.observe(self._run), value))
+            residual = max(residual, self._run.residual())
+            if tells_energy:
+                energy = max(energy, abs(self._run.energy() - self._start - self._work()))
+        own = residual if found.residual is None else found.residual
+        told = energy if tells_energy else None
+        return Point(scheme.engine, scheme.name, setting.h, setting.tolerance, error, told, own, None, None)
+
+    def lost(self, scheme: Scheme, setting: Setting) -> Point:
+        """A setting at which the motion was lost."""
+        return Point(scheme.engine, scheme.name, setting.h, setting.tolerance, None, None, None, None, None)
+
+    def _work(self) -> float:
+        """Of the constant forces, J."""
+        tau = self._benchmark.tau
+        return 0.0 if tau is None else float(tau @ (self._run.q - self._benchmark.q))
+
+
+def _timed(point: Point, seconds: float) -> Point:
+    return Point(**{**point.figures(), "seconds": seconds, "real_time": 1.0 / seconds})

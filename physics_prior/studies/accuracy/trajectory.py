@@ -1,0 +1,79 @@
+"""What any contestant does: run a benchmark at a step size and hand back its states and the processor time that took."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from time import process_time
+from typing import Protocol
+
+import numpy as np
+
+from physics_prior.studies.problems.mechanism import Benchmark
+
+LONGEST = 4.0  # s of processor time, beyond which a run is given up
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Step size h, s, and, for integrators that choose their own steps within it, the error allowed each."""
+
+    h: float
+    tolerance: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """States at the benchmark's times.
+
+    Attributes:
+        seconds: processor time over all of the benchmark's, s.
+        q: (k, nq) in the benchmark's tree; None where the run was given up as too slow.
+        v: (k, nv); None where the contestant does not tell.
+        residual: how far what holds was off at most, m, in the contestant's own coordinates; None: judge by q.
+    """
+
+    seconds: float
+    q: np.ndarray | None
+    v: np.ndarray | None
+    residual: float | None = None
+
+
+class Scheme(Protocol):
+    """A formulation with an integrator, or another engine with one.
+
+    Attributes:
+        engine: "compiled", "textbook", or the peer's name.
+        name: formulation or engine, and integrator.
+        settings: at which to run it.
+    """
+
+    engine: str
+    name: str
+    settings: Sequence[Setting]
+
+    def trajectory(self, benchmark: Benchmark, setting: Setting) -> Trajectory:
+        """Run from the benchmark's start; raises SimulationError where the motion is lost."""
+        ...
+
+
+Advance = Callable[[float, int], None]
+"""Move on by count steps of h, s."""
+
+
+def run_timed(
+    benchmark: Benchmark, setting: Setting, advance: Advance, state: Callable[[], tuple[np.ndarray, np.ndarray]]
+) -> Trajectory:
+    """Advance from time to time of the benchmark, by equal steps as near to h as divide the way; only that is timed."""
+    seconds, now, end = 0.0, 0.0, float(benchmark.times[-1])
+    q, v = [], []
+    for time in benchmark.times:
+        count = max(1, round((time - now) / setting.h))
+        begin = process_time()
+        advance((time - now) / count, count)
+        seconds += process_time() - begin
+        now = float(time)
+        own_q, own_v = state()
+        q.append(own_q.copy())
+        v.append(own_v.copy())
+        if seconds / now * end > LONGEST:
+            return Trajectory(seconds / now * end, None, None)
+    return Trajectory(seconds, np.array(q), np.array(v))

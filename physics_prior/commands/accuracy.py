@@ -44,13 +44,13 @@ def run(args: argparse.Namespace) -> int:
     with progress("accuracy") as report:
         found = run_study(problems, args.peers, report)
     data = card(found, args.peers)
+    if args.json is not None:
+        write_json(args.json, data)
     if args.plot is not None:
         from physics_prior.studies.accuracy.drawing import draw
 
         for problem, points in found.values():
             draw(problem, points, args.plot)
-    if args.json is not None:
-        write_json(args.json, data)
     if args.json != STDOUT:
         out = console(LINE_WIDTH)
         out.print(front_table(data))

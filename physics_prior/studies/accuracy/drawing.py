@@ -37,7 +37,7 @@ def picture(problem: Problem, points: Sequence[Point]) -> Figure:
     axes = figure.add_subplot()
     axes.set_xscale("log")
     axes.set_yscale("log")
-    usable = [p for p in points if p.error is not None and p.seconds is not None and FINEST < p.error < COARSEST]
+    usable = [point for point in points if FINEST < point.error < COARSEST]
     marks = iter(MARKERS * 3)
     for scheme in dict.fromkeys(point.scheme for point in usable):
         own = [point for point in usable if point.scheme == scheme]
@@ -47,8 +47,8 @@ def picture(problem: Problem, points: Sequence[Point]) -> Figure:
         elif own[0].engine == "textbook":
             axes.plot(x, y, ":", color=TEXTBOOK, lw=1.1, marker=".", ms=4)
         else:
-            style = {"color": PEERS[own[0].engine], "marker": next(marks), "mfc": "none", "ms": 6, "lw": 1.1}
-            axes.plot(x, y, ls="--", label=scheme, zorder=2, **style)
+            color, marker = PEERS[own[0].engine], next(marks)
+            axes.plot(x, y, ls="--", color=color, marker=marker, mfc="none", ms=6, lw=1.1, label=scheme, zorder=2)
     if any(point.engine == "textbook" for point in usable):
         axes.plot([], [], ":", color=TEXTBOOK, lw=1.1, marker=".", ms=4, label="NumPy formulations")
     edge = front([point for point in usable if point.engine == "compiled"])

@@ -49,7 +49,7 @@ class Exudyn:
             if not stored:
                 if not _solve(system, settings):
                     raise SimulationError(f"{self.name} lost the motion at steps of {setting.h:g} s")
-                stored.extend(system.GetSensorStoredData(sensor) for sensor in sensors)
+                stored.extend(np.asarray(system.GetSensorStoredData(sensor)) for sensor in sensors)
 
         found = run_timed(benchmark, setting, advance, lambda: (benchmark.q, benchmark.v))
         return Trajectory(found.seconds, _angles(benchmark, stored), None)
@@ -69,7 +69,7 @@ def _build(system: Any, benchmark: Benchmark) -> list[Any]:
     """Bodies, hinges and held points of the benchmark; sensors of angles and of rates of all bodies."""
     import exudyn.itemInterface
 
-    items = exudyn.itemInterface
+    items: Any = exudyn.itemInterface
     tree = benchmark.tree
     gravity = pack_parameters(tree, benchmark.effects)[:GRAVITY]
     where = kinematics(tree, benchmark.q, benchmark.v)

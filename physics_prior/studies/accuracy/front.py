@@ -8,12 +8,9 @@ from physics_prior.studies.accuracy.measure import Point
 
 def front(points: Sequence[Point]) -> list[Point]:
     """Those that no other beats in both error and time, from coarse and cheap to fine and dear."""
-    able = sorted(
-        (p for p in points if p.error is not None and p.seconds is not None), key=lambda p: (p.seconds, p.error)
-    )
     out: list[Point] = []
-    for point in able:
-        if not out or point.error < out[-1].error:  # type: ignore[operator]
+    for point in sorted(points, key=lambda each: (each.seconds, each.error)):
+        if not point.lost and (not out or point.error < out[-1].error):
             out.append(point)
     return out
 
@@ -25,14 +22,10 @@ def seconds_to_reach(points: Sequence[Point], error: float) -> float | None:
     """
     edge = front(points)
     for before, point in zip([None, *edge], edge, strict=False):
-        assert point.error is not None
-        assert point.seconds is not None
         if point.error > error:
             continue
         if before is None or before.scheme != point.scheme or point.error == 0.0:
             return point.seconds
-        assert before.error is not None
-        assert before.seconds is not None
         share = math.log(before.error / error) / math.log(before.error / point.error)
         return float(before.seconds * (point.seconds / before.seconds) ** share)
     return None

@@ -1,7 +1,8 @@
 """Runs the schemes of a problem in turns, and tells error, energy, residual and cost of each setting."""
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from statistics import median
 from typing import Any
 
@@ -23,26 +24,30 @@ class Point:
 
     Attributes:
         engine, scheme, h, tolerance: which.
-        error: largest distance from the reference, in the problem's unit; None where the motion was lost.
+        error: largest distance from the reference, in the problem's unit; infinite where the motion was lost.
         energy: largest change of energy less work done, J; None where it does not stay, or is not told.
         residual: how far what holds was off at most, m.
-        seconds: processor time per simulated second, the median.
-        real_time: simulated over processor time.
+        seconds: processor time per simulated second, the median; infinite where the motion was lost.
     """
 
     engine: str
     scheme: str
     h: float
     tolerance: float | None
-    error: float | None
+    error: float
     energy: float | None
     residual: float | None
-    seconds: float | None
-    real_time: float | None
+    seconds: float
+
+    @property
+    def lost(self) -> bool:
+        """Whether the motion was."""
+        return math.isinf(self.error)
 
     def figures(self) -> dict[str, Any]:
-        """As plain data."""
-        return asdict(self)
+        """As plain data, with the simulated over the processor time; what is infinite is null."""
+        figures = asdict(self) | {"real_time": 1.0 / self.seconds}
+        return figures | dict.fromkeys(("error", "seconds", "real_time")) if self.lost else figures
 
 
 def measure(
@@ -73,7 +78,7 @@ def measure(
             if found.q is None:
                 break
             points[index, setting] = judge.point(scheme, setting, found)
-            if points[index, setting].error is not None:
+            if not points[index, setting].lost:
                 times[index, setting] = []
         progress((index + 1) / len(schemes) * 0.5)
     # the runs above have warmed everything up; these are those that count
@@ -82,7 +87,10 @@ def measure(
             if not taken or taken[0] < REPEATED:
                 taken.append(schemes[index].trajectory(benchmark, setting).seconds)
         progress(0.5 + 0.5 * (done + 1) / rounds)
-    return [_timed(point, median(times[key]) / duration) if key in times else point for key, point in points.items()]
+    return [
+        replace(point, seconds=median(times[key]) / duration) if key in times else point
+        for key, point in points.items()
+    ]
 
 
 class Judge:
@@ -110,17 +118,13 @@ class Judge:
                 energy = max(energy, abs(self._run.energy() - self._start - self._work()))
         own = residual if found.residual is None else found.residual
         told = energy if tells_energy else None
-        return Point(scheme.engine, scheme.name, setting.h, setting.tolerance, error, told, own, None, None)
+        return Point(scheme.engine, scheme.name, setting.h, setting.tolerance, error, told, own, math.inf)
 
     def lost(self, scheme: Scheme, setting: Setting) -> Point:
         """A setting at which the motion was lost."""
-        return Point(scheme.engine, scheme.name, setting.h, setting.tolerance, None, None, None, None, None)
+        return Point(scheme.engine, scheme.name, setting.h, setting.tolerance, math.inf, None, None, math.inf)
 
     def _work(self) -> float:
         """Of the constant forces, J."""
         tau = self._benchmark.tau
         return 0.0 if tau is None else float(tau @ (self._run.q - self._benchmark.q))
-
-
-def _timed(point: Point, seconds: float) -> Point:
-    return Point(**{**point.figures(), "seconds": seconds, "real_time": 1.0 / seconds})

@@ -1,6 +1,7 @@
 """The study from problem to problem: points of all who take part."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from physics_prior.studies.accuracy.measure import Point, measure
 from physics_prior.studies.accuracy.problem import Problem
@@ -20,8 +21,11 @@ def run_study(
     with one_core():
         for index, problem in enumerate(problems):
             schemes = own_schemes(problem) + (peer_schemes(problem) if peers else [])
-            points = measure(
-                problem, schemes, lambda part, i=index, p=problem: progress((i + part) / len(problems), p.key)
-            )
-            out[problem.key] = (problem, points)
+            report = partial(_part, progress, index, problems)
+            out[problem.key] = (problem, measure(problem, schemes, report))
     return out
+
+
+def _part(progress: Callable[[float, str], None], index: int, problems: Sequence[Problem], part: float) -> None:
+    """Tell how far the whole study is when part of a problem is."""
+    progress((index + part) / len(problems), problems[index].key)

@@ -46,9 +46,14 @@ class Scheme(Protocol):
         settings: at which to run it.
     """
 
-    engine: str
-    name: str
-    settings: Sequence[Setting]
+    @property
+    def engine(self) -> str: ...
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def settings(self) -> Sequence[Setting]: ...
 
     def trajectory(self, benchmark: Benchmark, setting: Setting) -> Trajectory:
         """Run from the benchmark's start; raises SimulationError where the motion is lost."""

@@ -1,15 +1,14 @@
 """The study of accuracy: its contestants against each other, its front, its card and its command. Nothing here asks how fast."""
 
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from physics_prior import cli
-from physics_prior.dynamics.compose import GRAVITY, pack_parameters
-from physics_prior.dynamics.formulations import generalized
-from physics_prior.dynamics.simulator import Simulator
 from physics_prior.errors import PhysicsPriorError
 from physics_prior.studies.accuracy import measure as measuring
 from physics_prior.studies.accuracy import problem as problems
@@ -19,14 +18,26 @@ from physics_prior.studies.accuracy.front import front, seconds_to_reach
 from physics_prior.studies.accuracy.measure import Point, measure
 from physics_prior.studies.accuracy.problem import PROBLEMS
 from physics_prior.studies.accuracy.schemes import own_schemes
-from physics_prior.studies.accuracy.textbook import FORMULATIONS, Textbook, forces_of
+from physics_prior.studies.accuracy.textbook import FORMULATIONS, Textbook
 from physics_prior.studies.accuracy.trajectory import Setting
 
 COARSE = [Setting(0.05), Setting(0.025)]
 
 
 def point(error, seconds, scheme="rk4", engine="compiled"):
-    return Point(engine, scheme, 0.01, None, error, 0.0, 0.0, seconds, None if seconds is None else 1.0 / seconds)
+    return Point(engine, scheme, 0.01, None, error, 0.0, 0.0, seconds)
+
+
+def short(key):
+    """A problem over its first second."""
+    problem = PROBLEMS[key]
+
+    def make():
+        whole = problem.make()
+        kept = whole.times <= 1.0
+        return replace(whole, times=whole.times[kept], values=whole.values[kept])
+
+    return replace(problem, make=make)
 
 
 def two_schemes(_):
@@ -34,7 +45,7 @@ def two_schemes(_):
 
 
 def test_the_front_holds_what_nothing_beats():
-    coarse, fine, beaten, lost = point(1e-2, 1.0), point(1e-4, 10.0), point(1e-3, 20.0), point(None, None)
+    coarse, fine, beaten, lost = point(1e-2, 1.0), point(1e-4, 10.0), point(1e-3, 20.0), point(math.inf, math.inf)
     assert front([beaten, fine, lost, coarse]) == [coarse, fine]
 
 
@@ -48,58 +59,39 @@ def test_time_to_reach_an_error_is_straight_in_logarithms():
 
 @pytest.mark.parametrize("key", ["pendulum", "double_pendulum"])
 def test_kernels_and_textbook_make_the_same_error(key):
-    """RK4 in joint coordinates, compiled and in NumPy: errors agree to 5e-11 of themselves at most."""
-    compiled, finer, textbook = measure(PROBLEMS[key], two_schemes(None), rounds=1)
+    """RK4 in joint coordinates, compiled and in NumPy, over 1 s."""
+    compiled, finer, textbook = measure(short(key), two_schemes(None), rounds=1)
     assert compiled.error == pytest.approx(textbook.error, rel=1e-8)
     assert 8.0 < compiled.error / finer.error < 40.0  # order 4: 16
     assert compiled.energy == pytest.approx(textbook.energy, rel=1e-6)
-    assert compiled.real_time == pytest.approx(1.0 / compiled.seconds)
 
 
 def test_formulations_differ_by_their_drift():
-    """Three seconds of the double pendulum at 20 ms: all follow it, those with explicit joints let them open."""
-    problem = PROBLEMS["double_pendulum"]
-    whole = problem.make()
-    short = problems.Problem(problem.key, "", "m", lambda: _until(whole, 3.0), (0.02,))
+    """One second of the double pendulum at 20 ms: all follow it, those with explicit joints let them open."""
     schemes = [Textbook(name, "rk4", [Setting(0.02)]) for name in FORMULATIONS]
-    found = {point.scheme.split(",")[0]: point for point in measure(short, schemes, rounds=1)}
+    found = {point.scheme.split(",")[0]: point for point in measure(short("double_pendulum"), schemes, rounds=1)}
     assert found["generalized"].residual == 0.0
     for name in ("quaternion", "maximal"):
         assert 1e-10 < found[name].residual < 1e-3
     assert max(point.error for point in found.values()) < 1e-3
 
 
-def _until(benchmark, end):
-    kept = benchmark.times <= end
-    return type(benchmark)(
-        benchmark.tree,
-        benchmark.effects,
-        benchmark.q,
-        benchmark.v,
-        benchmark.tau,
-        observe=benchmark.observe,
-        times=benchmark.times[kept],
-        values=benchmark.values[kept],
-    )
-
-
 def test_springs_in_the_textbook_are_those_of_the_kernels():
-    """Andrews' mechanism on its way: acceleration by NumPy and by the kernels. Measured 5e-13 of the largest."""
-    benchmark = PROBLEMS["andrews"].make()
+    """The governor, whose springs also damp, over 200 steps of 10 us: the same RK4 in NumPy. Measured 2.3e-16."""
+    benchmark = PROBLEMS["governor"].make()
     run = benchmark.run()
-    run.to(0.01, 1e-4)
-    pairs = [pair for effect in benchmark.effects for pair in effect.point_pairs(benchmark.tree)]
-    gravity = pack_parameters(benchmark.tree, benchmark.effects)[:GRAVITY]
-    tau = forces_of(benchmark)(run.q, run.v)
-    textbook = generalized.mixed_accelerations(benchmark.tree, run.q, run.v, tau, gravity, pairs).acceleration
-    kernels = Simulator(benchmark.tree, benchmark.effects).acceleration(run.q, run.v, benchmark.tau)
-    assert np.max(np.abs(textbook - kernels)) < 1e-10 * np.max(np.abs(kernels))
+    run.to(2e-3, 1e-5)
+    short = replace(benchmark, times=np.array([2e-3]), values=benchmark.values[:1])
+    textbook = Textbook("generalized", "rk4", ()).trajectory(short, Setting(1e-5))
+    assert np.max(np.abs(run.q - benchmark.q)) > 1e-3
+    assert np.max(np.abs(textbook.q[0] - run.q)) < 1e-13
+    assert np.max(np.abs(textbook.v[0] - run.v)) < 1e-13
 
 
 def test_a_motion_that_is_lost_is_told():
     (lost,) = measure(PROBLEMS["governor"], [Compiled("rk4", [Setting(0.01)], "rk4")], rounds=1)
-    assert lost.error is None
-    assert lost.seconds is None
+    assert lost.lost
+    assert lost.figures()["error"] is None
 
 
 def test_what_takes_too_long_is_left_out(monkeypatch):
@@ -144,6 +136,7 @@ def test_every_problem_has_its_schemes():
 
 def test_command(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(study, "own_schemes", two_schemes)
+    monkeypatch.setitem(PROBLEMS, "pendulum", short("pendulum"))
     card, pictures = tmp_path / "card.json", tmp_path / "new" / "pictures"
     assert cli.main(["accuracy", "pendulum", "--json", str(card), "--plot", str(pictures)]) == 0
     assert "Simple pendulum" in capsys.readouterr().out

@@ -112,7 +112,7 @@ def test_version(capsys):
 @pytest.mark.parametrize(
     ("words", "culprit", "valid"),
     [
-        ([], "a command", "check, simulate"),
+        ([], "a command", "check, urdf"),
         (["chekc"], "'chekc'", "check"),
         (["check"], "SCENE", "check --help"),
         (["check", "nonesuch"], "'nonesuch'", "double_pendulum"),

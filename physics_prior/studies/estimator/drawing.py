@@ -24,7 +24,7 @@ ABOVE = {"rk4": -9, "semi_implicit_euler": 5, "no physics": 5, "fewer measuremen
 ROWS = (
     ("rmse_deg", "error of angles [deg]"),
     ("force_percent", "error of forces [% of weight]"),
-    ("nees", "NEES (1 is right)"),
+    ("consistency", "NEES, or NIS of a recording (1 is right)"),
 )
 
 
@@ -69,7 +69,7 @@ def draw(points: Sequence[Point], path: Path) -> None:
             if row == 0:
                 least = best.rmse_deg
                 place.axhspan(least / PAYING, least * PAYING, color="#000000", alpha=0.08, lw=0)
-            if key == "nees":
+            if key == "consistency":
                 place.axhline(1.0, color="#222222", lw=0.6)
             _logarithmic(place)
             place.grid(color="#000000", alpha=0.08, lw=0.6)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from time import thread_time_ns
 from typing import Any
 
@@ -15,14 +16,16 @@ from physics_prior.estimation.history import Node
 from physics_prior.estimation.smoother import smooth
 from physics_prior.estimation.square_root import normalised_error
 from physics_prior.model import JointKind
+from physics_prior.recording.replay import replay
 from physics_prior.recording.simulate import Moment
 from physics_prior.scene import Scene
-from physics_prior.studies.estimator.variants import PROBLEMS, VARIANTS, Variant
+from physics_prior.studies.estimator.variants import PROBLEMS, STEPS, VARIANTS, Variant
 from physics_prior.studies.moving_human import moments
 
 SECONDS, SETTLED = 8.0, 0.4  # s, and s of the beginning that do not count
 SMOOTHED_EVERY = 10  # stamps: of what a lag is for, a sample
 FOREVER = 1e6  # s
+COMPILED = 0.5  # s of a recording, after which everything is compiled
 PAYING = 1.02  # times the least error of the same measurements: below it, noise is all that is left
 
 
@@ -33,7 +36,8 @@ class Point:
     Attributes:
         us: microseconds of the processor a measurement, the median, and what smoothing adds at every stamp.
         rmse_deg: of all turning freedoms, deg.
-        nees: normalised estimation error squared over its degrees of freedom: 1 where the covariance is right.
+        consistency: normalised estimation error squared over its degrees of freedom, or, of a recording, innovation squared
+            (NIS) over its expectation: 1 where the covariance is right.
         force_percent: error of the joints' forces, percent of the weight; nan where the process knows none.
     """
 
@@ -42,7 +46,7 @@ class Point:
     label: str
     us: float
     rmse_deg: float
-    nees: float
+    consistency: float
     force_percent: float
 
 
@@ -91,6 +95,32 @@ def measure(name: str, scene: Scene, variant: Variant, recording: Sequence[Momen
     return Point(name, variant.series, variant.label, float(np.median(times)) + smoothing, rmse, nees, force)
 
 
+def run_recording(bag: Path, scene: Scene, reference: str | None, progress: Callable[[float], None]) -> list[Point]:
+    """Replay a recording by every step, and without physics, against a JointState topic; costs are with readouts and scores.
+
+    Raises:
+        RecordingError: as of ``replay``; SimulationError: a motion that cannot be computed.
+    """
+    out = []
+    variants = [*STEPS, Variant(process="kinematic")]
+    for done, variant in enumerate(variants):
+        replay(bag, variant.of(scene), process=variant.process, until=COMPILED)
+        start = thread_time_ns()
+        result = replay(bag, variant.of(scene), process=variant.process, reference=reference)
+        us = (thread_time_ns() - start) / 1e3 / result.counts.read
+        figures = result.summary()
+        score, nis = figures["reference"] or {}, figures["nis"]
+        angles, forces = (_number(score.get(key)) for key in ("position_rmse_deg", "force_rmse_percent_weight"))
+        consistency = nis["mean"] / nis["expected"] if nis["mean"] is not None else float("nan")
+        out.append(Point(scene.name, variant.series, variant.label, us, angles, consistency, forces))
+        progress((done + 1) / len(variants))
+    return out
+
+
+def _number(value: float | None) -> float:
+    return float("nan") if value is None else value
+
+
 def _smoothed(estimator: Estimator, lag: float) -> dict[int, Posterior]:
     """Posteriors at a sample of the stamps, told by what was measured within the lag after them."""
     nodes, out = estimator.history.nodes, {}
@@ -124,8 +154,14 @@ def _errors(estimator: Estimator, pairs: Sequence[tuple[Moment, Posterior]]) -> 
 
 
 def enough(points: Sequence[Point], problem: str) -> Point:
-    """The cheapest of a problem's steps whose error is that of the noise, within PAYING."""
+    """The cheapest of a problem's steps whose error is that of the noise, within PAYING.
+
+    Raises:
+        PhysicsPriorError: the errors are not known.
+    """
     own = [point for point in points if point.problem == problem and point.series in ("rk4", "semi_implicit_euler")]
+    if any(np.isnan(point.rmse_deg) for point in own):
+        raise PhysicsPriorError(f"'{problem}' has no angles to score: give a --reference topic that names its joints")
     least = min(point.rmse_deg for point in own)
     return min((point for point in own if point.rmse_deg <= PAYING * least), key=lambda point: point.us)
 
@@ -142,7 +178,7 @@ def table(points: Sequence[Point]) -> Table:
     out = Table(
         title=f"what accuracy costs the estimator; * is enough: cheapest within {100 * (PAYING - 1):.0f} % of the least error"
     )
-    for column in ("problem", "by", "", "us a measurement", "RMSE, deg", "NEES", "force, % of weight"):
+    for column in ("problem", "by", "", "us a measurement", "RMSE, deg", "consistency", "force, % of weight"):
         out.add_column(column, justify="left" if column in ("problem", "by") else "right")
     for point in points:
         mark = "*" if point == enough(points, point.problem) else ""
@@ -153,7 +189,7 @@ def table(points: Sequence[Point]) -> Table:
             point.label + mark,
             f"{point.us:.0f}",
             f"{point.rmse_deg:.4g}",
-            f"{point.nees:.2f}",
+            f"{point.consistency:.2f}",
             force,
         )
     return out

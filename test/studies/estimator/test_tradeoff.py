@@ -1,6 +1,7 @@
 """The study of what accuracy costs the estimator: its figures on a short recording, its picture, its refusals."""
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -10,6 +11,8 @@ from physics_prior.studies.estimator import study
 from physics_prior.studies.estimator.study import Point, enough, measure, run_study
 from physics_prior.studies.estimator.variants import PROBLEMS, Variant
 from physics_prior.studies.moving_human import moments
+
+ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +30,7 @@ def test_smoothing_helps_and_no_physics_costs(recording):
     )
     assert late.rmse_deg < 0.95 * plain.rmse_deg
     assert none.rmse_deg > 2.0 * plain.rmse_deg
-    assert 0.3 < plain.nees < 1.7
+    assert 0.3 < plain.consistency < 1.7
     assert plain.force_percent < 2.0
     assert none.force_percent != none.force_percent
     assert plain.us > 0.0
@@ -56,3 +59,17 @@ def test_command_draws_and_writes(tmp_path, monkeypatch, capsys):
     assert figures["enough"]["double_pendulum"]["series"] == "rk4"
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert "RMSE, deg" in capsys.readouterr().out
+
+
+def test_recording_is_replayed_by_each_step(monkeypatch, capsys):
+    """The shipped bag: 0.219 deg, as ``replay`` says, 1.2 without physics."""
+    monkeypatch.setattr(study, "STEPS", (Variant(size=5e-3),))
+    words = ["--bag", str(ROOT / "bags/double_pendulum"), "--scene", "double_pendulum"]
+    assert cli.main(["tradeoff", *words, "--reference", "/truth/joint_states", "--json", "-"]) == 0
+    physics, none = json.loads(capsys.readouterr().out)["points"]
+    assert physics["rmse_deg"] == pytest.approx(0.219, abs=2e-3)
+    assert physics["consistency"] == pytest.approx(5.880 / 6.0, abs=1e-2)
+    assert none["series"] == "no physics"
+    assert none["rmse_deg"] > 2.0 * physics["rmse_deg"]
+    assert cli.main(["tradeoff", *words]) == 2
+    assert "give all three or none" in capsys.readouterr().err

@@ -7,8 +7,11 @@ update with its covariance, on the same tree in motion: its split, and, where bi
 With --effects, each built-in effect is taken out of a copy of the program instead, and a scene that does not name it is compiled
 and run in both: the same bits, the same instructions. Takes some two to three minutes.
 
+With --sleep, boxes at rest beside a pendulum are stepped with sleep and without.
+
 Examples:
   physics-prior bench
+  physics-prior bench --sleep
   physics-prior bench --effects
   physics-prior bench --peers --json bench.json
 """
@@ -24,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--effects", action="store_true", help="show that effects cost nothing where they are not named"
     )
+    parser.add_argument("--sleep", action="store_true", help="tell what sleep saves where islands rest")
     parser.add_argument("--json", metavar="FILE", help="write the figures as JSON; - prints that and nothing else")
 
 
@@ -32,6 +36,8 @@ def run(args: argparse.Namespace) -> int:
     require_folder("--json", args.json)
     if args.effects:
         return _effects(args)
+    if args.sleep:
+        return _sleep(args)
     from physics_prior.studies import bench_estimator
     from physics_prior.studies.bench import run_bench, table
 
@@ -50,6 +56,18 @@ def _effects(args: argparse.Namespace) -> int:
 
     with progress("building and running") as report:
         figures = run_effect_costs(progress=report)
+    if args.json is not None:
+        write_json(args.json, figures)
+    if args.json != STDOUT:
+        console().print(table(figures), soft_wrap=True)
+    return 0
+
+
+def _sleep(args: argparse.Namespace) -> int:
+    from physics_prior.studies.sleep_costs import run_sleep_costs, table
+
+    with progress("timing") as report:
+        figures = run_sleep_costs(report)
     if args.json is not None:
         write_json(args.json, figures)
     if args.json != STDOUT:

@@ -16,7 +16,8 @@ DURATION, WITH_CONTACT = "~15 s", "~40 s"
 def compiling(scene: Scene, last: Literal["advance", "carry"]) -> Iterator[None]:
     """Say what is going on while the block makes the first use of a scene's step; last: what it compiles last of that."""
     constrained, touching = kinds_of_rows(scene.tree, scene.effects)
-    step = step_module(scene.effects, constrained, scene.step.integrator, touching)
+    sleeping = scene.step.sleep is not None and last == "advance"  # the estimator's simulator knows no sleep
+    step = step_module(scene.effects, constrained, scene.step.integrator, touching, sleeping)
     cached = any(cache_directory().glob(f"*/{step.__name__}.{getattr(step, last).__name__}-*.nbc"))
     duration = WITH_CONTACT if touching else DURATION
     with status(f"loading {scene.name}" if cached else f"compiling the step of {scene.name}, once: {duration}"):

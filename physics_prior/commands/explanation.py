@@ -84,7 +84,7 @@ def scene_figures(scene: Scene, costs: Sequence[float] | None = None) -> dict[st
 def step_text(scene: Scene) -> str:
     """The source of the scene's compiled step."""
     constrained, touching = kinds_of_rows(scene.tree, scene.effects)
-    return step_source(scene.effects, constrained, scene.step.integrator, touching)
+    return step_source(scene.effects, constrained, scene.step.integrator, touching, scene.step.sleep is not None)
 
 
 def _model(scene: Scene) -> Table:
@@ -190,6 +190,10 @@ def _state(scene: Scene, figures: dict[str, Any]) -> Table:
     own = [topic for topic in topics_of(scene) if not topic.endswith("/stddev")]
     out.add_row("publishes", ", ".join(own) + "; of joints and forces also TOPIC/stddev")
     out.add_row("step", f"{step['integrator']}, {step['size'] * 1e3:g} ms")
+    if scene.step.sleep is not None:
+        sleep = scene.step.sleep
+        limits = f"slower than {sleep.velocity:g} m/s and rad/s for {sleep.duration:g} s"
+        out.add_row("asleep in simulations", f"what has been {limits}, until it is touched")
     out.add_row(
         "cost of a step", f"{step['us']:.3g} us here; with its derivatives {step['us_with_derivatives']:.3g} us"
     )

@@ -55,11 +55,16 @@ def kinds_of_rows(tree: Tree, effects: Sequence[Effect]) -> tuple[bool, bool]:
 
 
 def step_source(
-    effects: Sequence[Effect], constrained: bool, integrator: IntegratorName, touching: bool = False
+    effects: Sequence[Effect],
+    constrained: bool,
+    integrator: IntegratorName,
+    touching: bool = False,
+    sleeping: bool = False,
 ) -> str:
-    """The text of a scene's step module, with equality rows or not, and with inequality rows or not."""
+    """The text of a scene's step module, with equality rows or not, with inequality rows or not, and with sleep or not."""
     files = [f"integrators.{file}" for file in INTEGRATORS[integrator].files]
-    texts = {name: _text(name) for name in ("motion", *files, *(["contact.events"] if touching else []), "step")}
+    events = [*(["contact.events"] if touching else []), *(["contact.sleep"] if sleeping else [])]
+    texts = {name: _text(name) for name in ("motion", *files, *events, "step")}
     imports = ["from physics_prior.dynamics.compose import section"]
     names: dict[str, str] = {}
     lines: dict[str, list[str]] = {each: [] for each in FUNCTIONS}
@@ -86,15 +91,20 @@ def step_source(
         texts["motion"] = _replace(texts["motion"], "effects", "\n\n\n".join(parts) + "\n")
     texts["motion"] = _replace(texts["motion"], "constraints", f"CONSTRAINED = {constrained}")
     if touching:
-        texts["step"] = _replace(texts["step"], "events", "move, linearise = event_step, linearise_events")
+        step = "sleeping_step" if sleeping else "event_step"
+        texts["step"] = _replace(texts["step"], "events", f"move, linearise = {step}, linearise_events")
     return "\n\n".join(texts.values())
 
 
 def step_module(
-    effects: Sequence[Effect], constrained: bool, integrator: IntegratorName, touching: bool = False
+    effects: Sequence[Effect],
+    constrained: bool,
+    integrator: IntegratorName,
+    touching: bool = False,
+    sleeping: bool = False,
 ) -> ModuleType:
     """The step module of a scene, written to the kernel cache where it is not there yet, and imported."""
-    text = step_source(effects, constrained, integrator, touching)
+    text = step_source(effects, constrained, integrator, touching, sleeping)
     name = "step_" + hashlib.sha256(text.encode()).hexdigest()[:16]
     if name in sys.modules:
         return sys.modules[name]
@@ -118,7 +128,7 @@ def _text(name: str) -> str:
     """The text of a part of the step, without what it imports from the parts before it: there it stands already."""
     source = Path(__file__).parent.joinpath(*name.split(".")).with_suffix(".py").read_text()
     lines = source.splitlines()
-    parts = (f"{ROOM}.motion", f"{ROOM}.integrators.")
+    parts = (f"{ROOM}.motion", f"{ROOM}.integrators.", f"{ROOM}.contact.events")
     for node in reversed(ast.parse(source).body):
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(parts):
             del lines[node.lineno - 1 : node.end_lineno]

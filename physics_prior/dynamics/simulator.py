@@ -9,13 +9,14 @@ from physics_prior import rotations
 from physics_prior.dynamics import anchor_motion, constraint, kinematics, manifold, newton_euler, projection
 from physics_prior.dynamics.compose import GRAVITY, pack_parameters, step_module
 from physics_prior.dynamics.contact import impulse
-from physics_prior.dynamics.contact.memory import candidates_in, contact_memory, residual_in
+from physics_prior.dynamics.contact.memory import Sleep, candidates_in, contact_memory, residual_in, rested_in
 from physics_prior.dynamics.contact.reactions import candidates_by_name, reaction
 from physics_prior.dynamics.contact.records import candidate_records
 from physics_prior.dynamics.covariance import carry_step
+from physics_prior.dynamics.failure import failure
 from physics_prior.dynamics.inertia_check import check_inertia
 from physics_prior.dynamics.integrators import DEFAULT, INTEGRATORS, TOLERATED, IntegratorName
-from physics_prior.dynamics.memory import OPEN, SPARE, TIME, TOLERANCE, Memory, correction_size, tangent_size
+from physics_prior.dynamics.memory import SPARE, TIME, TOLERANCE, Memory, correction_size, tangent_size
 from physics_prior.dynamics.records import link_records, motion_tables, moved_freedoms, pair_records
 from physics_prior.dynamics.switches import Switches
 from physics_prior.dynamics.wrench import Wrench
@@ -29,7 +30,8 @@ class Simulator:
 
     State: q (nq,), v (nv,) as Tree says. Methods that move a state do it in place and without allocating.
 
-    tolerance is the error of a step that an adaptive integrator allows, m and rad, m/s and rad/s.
+    tolerance is the error of a step that an adaptive integrator allows, m and rad, m/s and rad/s. With sleep given, ``advance``
+    lets islands at rest sleep (contact/sleep.py); all else sees them as ever.
 
     Attributes:
         tree, effects, integrator: what it was built from.
@@ -43,7 +45,7 @@ class Simulator:
             unique, the split of forces is not).
 
     Raises:
-        ModelError: a joint that moves no inertia; an effect that does not fit the tree.
+        ModelError: a joint that moves no inertia; an effect that does not fit the tree; sleep where nothing may touch.
     """
 
     def __init__(
@@ -53,6 +55,7 @@ class Simulator:
         integrator: IntegratorName = DEFAULT,
         tolerance: float = TOLERATED,
         interval: float = 1e-3,
+        sleep: Sleep | None = None,
     ) -> None:
         if integrator not in INTEGRATORS:
             raise ModelError(f"integrator '{integrator}' is unknown: known are {list(INTEGRATORS)}")
@@ -69,6 +72,8 @@ class Simulator:
         touching = [pair for effect in effects for pair in effect.touching_pairs(tree)]
         ranges = [each for effect in effects for each in effect.joint_ranges(tree)]
         candidates = candidate_records(tree, ranges, touching)
+        if sleep is not None and not len(candidates):
+            raise ModelError("'sleep' is not valid where nothing may touch: it spares contact, and there is none")
         self.touching = candidates_by_name(tree, effects)
         self.wrench_names = [
             *(link.joint.name for link in tree.links),
@@ -93,14 +98,14 @@ class Simulator:
             self.nv,
             SPARE + needs.vectors,
             own_size if needs.implicit else 0,
-            contact_memory(candidates, self.rows, width, self.nq) if len(candidates) else None,
+            contact_memory(candidates, self.rows, width, self.nq, sleep) if len(candidates) else None,
         )
         memory.array[TOLERANCE] = tolerance
         self.memory = memory
         self._links, self._work, self._pairs = memory.links, memory.work, memory.pairs
         self.candidates = candidates_in(memory.contact_part)
         self._gravity = memory.parameters[:GRAVITY]
-        self.step = step_module(effects, bool(pairs), integrator, len(candidates) > 0)
+        self.step = step_module(effects, bool(pairs), integrator, len(candidates) > 0, sleep is not None)
         self._rotations, self._origins = self._work["rotation"].reshape(-1, 3, 3), self._work["origin"]
         self._frames: dict[Any, tuple[int, np.ndarray, np.ndarray]] = {}
         self._still, self._vdot = np.zeros(self.nv), np.zeros(self.nv)
@@ -179,6 +184,7 @@ class Simulator:
 
     def begin(self, q: np.ndarray, v: np.ndarray) -> None:
         """Begin the scene at q and v: time zero, and what holds then takes hold; SimulationError if it cannot."""
+        rested_in(self.memory.contact_part)[:] = 0.0
         self.switches.begin(q, v)
 
     def displaced(self, q: np.ndarray, delta: np.ndarray) -> np.ndarray:
@@ -346,6 +352,12 @@ class Simulator:
         return residual_in(self.memory.contact_part)
 
     @property
+    def asleep(self) -> tuple[str, ...]:
+        """The parts that carry joints of what sleeps now."""
+        rested = rested_in(self.memory.contact_part)
+        return tuple(link.part for link, time in zip(self.tree.links, rested, strict=False) if time == np.inf)
+
+    @property
     def effort(self) -> np.ndarray:
         """(nv,) generalized forces of the effects at the last ``acceleration`` or ``wrenches``; no wrenches on parts."""
         return np.array(self.memory.spare[2])
@@ -359,19 +371,8 @@ class Simulator:
     def moved(self, rank: int, h: float) -> None:
         """Take in what a step of h seconds returned: its rank, or SimulationError where that is negative."""
         self.rank = rank
-        if rank == -1:
-            raise SimulationError(
-                f"the motion is not finite after a step of {h:g} s: a smaller step size or another integrator may do"
-            )
-        if rank == -3:
-            raise SimulationError(
-                f"{self.switches.furthest()} is open by {self.memory.array[OPEN]:.3g} m after a step of {h:g} s, and cannot be"
-                " closed from there: a smaller step size may do"
-            )
         if rank < 0:
-            raise SimulationError(
-                f"the integrator '{self.integrator}' found no solution of a step of {h:g} s: a smaller step size may do"
-            )
+            raise failure(self, rank, h)
 
     def _move_anchors(self) -> None:
         """Bring moving anchors to the present time."""

@@ -36,7 +36,8 @@ class Estimator:
 
     def __init__(self, scene: Scene, process: str = "physics", history_length: float = 1.0) -> None:
         self.scene = scene
-        self.simulator = scene.simulator()
+        # a covariance has no rest: what stands still may yet be moving, as far as is known
+        self.simulator = scene.simulator(sleeping=False)
         self.filter = Filter(scene, self.simulator, PROCESSES[process](scene, self.simulator))
         self.history = History(self.filter, round(history_length * 1e9))
         self.last_rejection = ""

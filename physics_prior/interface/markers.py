@@ -1,4 +1,4 @@
-"""Markers out, for RViz and Foxglove: parts as shapes, forces as arrows, touching and holding as dots, uncertainty as ellipsoids."""
+"""Markers out: parts as shapes, forces as arrows, what touches or holds as dots, uncertainty as ellipsoids."""
 
 from collections.abc import Iterator, Mapping
 

@@ -6,6 +6,7 @@ from typing import Any, get_args
 import numpy as np
 from pydantic import BaseModel
 
+from physics_prior.dynamics.compose import kinds_of_rows
 from physics_prior.effects import REGISTRY, Effect
 from physics_prior.effects.plug_ins import effect_loaders
 from physics_prior.errors import PhysicsPriorError, SceneError
@@ -41,6 +42,8 @@ def build_scene(top: Place) -> Scene:
     file = validate(SceneFile, top)
     tree = build_tree(top["model"])
     effects = _read_effects(top.get("effects"), tree)
+    if file.step.sleep is not None and not kinds_of_rows(tree, effects)[1]:
+        raise top["step"]["sleep"].error("is not valid where nothing may touch: name a contact or a joint_limit")
     measurements = _read_measurements(top.get("measurements"), tree, effects)
     if measurements and file.noise is None:
         raise top.error("'noise' is missing: say how far to trust the model, for example 'noise: {force: 1e-3}'")

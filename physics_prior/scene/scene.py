@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from physics_prior.dynamics.contact.memory import Sleep
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects import Effect
 from physics_prior.model import Tree
@@ -73,6 +74,9 @@ class Scene:
     initial: Initial
     simulation: Simulation
 
-    def simulator(self) -> Simulator:
-        """The scene's own compiled step."""
-        return Simulator(self.tree, self.effects, self.step.integrator, self.step.tolerance, self.step.size)
+    def simulator(self, sleeping: bool = True) -> Simulator:
+        """The scene's own compiled step; islands at rest sleep if the scene says so and ``sleeping`` does not forbid it."""
+        step, sleep = self.step, None
+        if sleeping and step.sleep is not None:
+            sleep = Sleep(step.sleep.velocity, step.sleep.duration)
+        return Simulator(self.tree, self.effects, step.integrator, step.tolerance, step.size, sleep)

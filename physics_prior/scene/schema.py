@@ -164,12 +164,20 @@ class ModelSection(Section):
         return self
 
 
+class SleepSection(Section):
+    """When simulated islands at rest sleep: once they have been slower than a velocity, m/s and rad/s, for a duration, s."""
+
+    velocity: Annotated[Number, Field(gt=0.0, le=1e-2)] = 1e-4
+    duration: PositiveTime = 0.5
+
+
 class Step(Section):
-    """Time stepping: the integrator, its step size, s, and the error that an adaptive one allows each part of a step."""
+    """Time stepping: the integrator, its step size, s, the error that an adaptive one allows each part of a step, and sleep."""
 
     integrator: IntegratorName = DEFAULT
     size: PositiveTime = 1e-3
     tolerance: Annotated[Number, Field(ge=1e-14, le=1e-2)] = TOLERATED
+    sleep: SleepSection | None = None
 
     @model_validator(mode="after")
     def _check_tolerance(self) -> "Step":

@@ -55,7 +55,9 @@ def look(work: Records, candidates: Records, points: Array, q: Array) -> float:
     least = math.inf
     for i in range(candidates.shape[0]):
         candidate = candidates[i]
-        if candidate.is_limit:
+        if candidate.asleep:
+            gap = math.inf
+        elif candidate.is_limit:
             gap = limit_gap(candidate, q)
         else:
             count, gap = find_points(work, candidate, 0.0, points), math.inf
@@ -103,6 +105,8 @@ def collect(
     count = 0
     for i in range(candidates.shape[0]):
         candidate = candidates[i]
+        if candidate.asleep:
+            continue
         if candidate.is_limit:
             gap = limit_gap(candidate, q)
             if gap <= TOUCHING + h * abs(v[links[candidate.link_b].v]):

@@ -1,6 +1,6 @@
 """The memory of contacts: the last part of a step's memory, empty in a scene that names none."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import carray
@@ -11,15 +11,26 @@ from physics_prior.dynamics.kernel import inline_kernel
 from physics_prior.dynamics.memory import CONTACT_PART, FLOAT, address
 from physics_prior.dynamics.types import Array
 
-HEAD = 8
+HEAD = 10
 CANDIDATE_SIZE, CONTACT_SIZE = CANDIDATE.itemsize // 8, CONTACT.itemsize // 8
 VECTORS = (
     10  # of the system: bias, kinds, owners, bounds, impulses, scratch (3), velocities, impulses but for restitution
 )
-STATES = 12  # configurations and velocities that an event step keeps beside the present ones
+STATES = 15  # configurations and velocities that an event step keeps beside the present ones, and those of what sleeps
+KEPT, PUSHED, RESTED, QUIET = 11, 12, 13, 14
+"""Of what sleeps, among the states: its configuration, acceleration as it fell asleep, time of rest and whether it is quiet."""
 
 
-def contact_memory(candidates: np.ndarray, equalities: int, width: int, nq: int) -> np.ndarray:
+class Sleep(NamedTuple):
+    """When what rests falls asleep: once it has been slower than ``velocity``, m/s or rad/s, for ``duration``, s."""
+
+    velocity: float
+    duration: float
+
+
+def contact_memory(
+    candidates: np.ndarray, equalities: int, width: int, nq: int, sleep: Sleep | None = None
+) -> np.ndarray:
     """The part's array for CANDIDATE records (C,), beside equality rows, over the degrees of freedom that rows move."""
     contacts = rows = 0
     for each in candidates:
@@ -38,6 +49,7 @@ def contact_memory(candidates: np.ndarray, equalities: int, width: int, nq: int)
     ]
     out = np.zeros(HEAD + sum(sizes))
     out[:5] = len(candidates), contacts, m, width, nq
+    out[8:HEAD] = sleep or (0.0, 0.0)
     out[HEAD : HEAD + sizes[0]].view(CANDIDATE)[:] = candidates
     return out
 
@@ -75,6 +87,21 @@ def contact_sections(memory: Array) -> Any:
         carray(address(memory, base + g), (VECTORS, m), FLOAT),
         carray(address(memory, base + h), (STATES, nq), FLOAT),
     )
+
+
+@inline_kernel
+def sleep_settings(memory: Array) -> tuple[float, float]:
+    """Velocity, m/s or rad/s, and duration, s, of a scene's sleep."""
+    base = int(memory[CONTACT_PART])
+    return float(memory[base + 8]), float(memory[base + 9])
+
+
+def rested_in(contact_part: np.ndarray) -> np.ndarray:
+    """How long each link has rested, s, as a view; infinite of those that sleep (entries beyond the links' number are zero)."""
+    if not len(contact_part):
+        return contact_part
+    states = contact_part[-STATES * int(contact_part[4]) :].reshape(STATES, -1)
+    return np.asarray(states[RESTED])
 
 
 def residual_in(contact_part: np.ndarray) -> float:

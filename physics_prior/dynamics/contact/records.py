@@ -40,6 +40,7 @@ CANDIDATE = np.dtype(
         ("quiet", "f8"),  # speed below which nothing bounces
         ("gap", "f8"),  # least distance when last looked at, m or rad
         ("before", "f8"),  # ... at the beginning of the step
+        ("asleep", "i8"),  # whether all of it rests, and the present step leaves it out
         ("coming", "i8"),  # whether it is about to touch within the step
         ("force", "f8", 3),  # ON link b when last asked for, world, N; of a limit along its axis, in [0]
         ("moment", "f8", 3),  # about ``point``

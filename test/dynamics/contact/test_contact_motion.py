@@ -9,6 +9,7 @@ from physics_prior import inertia, rotations
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects.contact import Contact
 from physics_prior.effects.gravity import Gravity
+from physics_prior.effects.joint_limit import JointLimit
 from physics_prior.model import Joint, JointKind, Part, Shape, Tree
 
 H = 1e-3
@@ -41,6 +42,22 @@ def test_flight_is_untouched(cube, at):
     still.advance(p, w, H, 500)
     assert np.array_equal(q, p)  # bit for bit
     assert np.array_equal(v, w)
+
+
+def test_only_what_touches_or_is_near_has_rows(cube, at):
+    """Of a box in flight none, on its face four points with a normal and two of friction each; of a stop one, at it."""
+    simulator = cube(friction=0.5)
+    for height, points in ((0.5, 0), (0.1, 4)):
+        q, v = at((0.0, 0.0, height))
+        simulator.advance(q, v, H)
+        simulator.wrenches(q, v)
+        assert simulator.memory.contact_part[5:7].tolist() == [points, 3 * points]
+    hinge = Joint("pin", JointKind.REVOLUTE, "world", "rod", axis=np.array([0.0, 1.0, 0.0]))
+    rod = Tree([Part("rod", inertia.point_mass(1.0, (0.0, 0.0, -1.0)))], [hinge])
+    stopped = Simulator(rod, [Gravity(), JointLimit(lower={"pin": -0.5}, upper={"pin": 0.5})])
+    for angle, points in ((0.3, 0), (0.5, 1), (-0.5, 1)):
+        stopped.wrenches(np.array([angle]), np.zeros(1))
+        assert stopped.memory.contact_part[5:7].tolist() == [points, points]
 
 
 @pytest.mark.parametrize("h", [1e-3, 1e-2])

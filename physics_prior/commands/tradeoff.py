@@ -1,9 +1,8 @@
 """Measure what accuracy costs the estimator: step size, integrator, update rate, smoothing and no physics at all.
 
 Simulated recordings at 50 Hz, the same for all: error of angles and of joint forces, and NEES, which is 1 where the covariance is
-right, against processor time a measurement. Marked is what is enough: the cheapest step whose error is within 2 % of the
-least, below which noise hides all that a better integration gains. Takes some minutes; the first time, kernels are compiled
-besides.
+right, against processor time a measurement. Marked is what is enough: the cheapest step that is within 2 % of the finest, so
+that noise hides all that a better integration gains. Takes some minutes; the first time, kernels are compiled besides.
 
 With --bag a recording is replayed instead, by every step and without physics, and scored against a JointState topic.
 

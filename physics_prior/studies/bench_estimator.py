@@ -28,7 +28,7 @@ from physics_prior.recording.simulate import Moment, message_of
 from physics_prior.scene import Scene, Step, load_scene
 from physics_prior.studies.moving_human import MARKERS, RATE, moments, moving_human
 
-STEP = Step(integrator="rk4", size=20e-3)  # the study `accuracy estimator` tells why: shorter ones gain nothing
+STEP = Step(integrator="rk4", size=20e-3)  # one a stamp: the study `tradeoff` tells what shorter ones gain
 SECONDS, LAPS = 8.0, 3
 SETTLED = 10  # stamps after the start, not counted
 PENDULUM_SECONDS = 5.0

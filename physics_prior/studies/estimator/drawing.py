@@ -45,6 +45,8 @@ def draw(points: Sequence[Point], path: Path) -> None:
             place = axes[row, column]
             for series, color in COLORS.items():
                 line = [point for point in own if point.series == series and np.isfinite(getattr(point, key))]
+                if not line:
+                    continue
                 x, y = [point.us for point in line], [getattr(point, key) for point in line]
                 place.plot(x, y, "o-", color=color, label=series.replace("_", " "), ms=4, lw=1.2)
                 for point, u, value in zip(line, x, y, strict=True):
@@ -67,8 +69,7 @@ def draw(points: Sequence[Point], path: Path) -> None:
                 label="enough: all else that a step gains, noise hides",
             )
             if row == 0:
-                least = best.rmse_deg
-                place.axhspan(least / PAYING, least * PAYING, color="#000000", alpha=0.08, lw=0)
+                place.axhspan(best.rmse_deg / PAYING, best.rmse_deg * PAYING, color="#000000", alpha=0.08, lw=0)
             if key == "consistency":
                 place.axhline(1.0, color="#222222", lw=0.6)
             _logarithmic(place)

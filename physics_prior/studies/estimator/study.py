@@ -30,7 +30,7 @@ from physics_prior.studies.moving_human import moments
 SECONDS, SETTLED = 8.0, 0.4  # s, and s of the beginning that do not count
 SMOOTHED_EVERY = 10  # stamps: of what a lag is for, a sample
 FOREVER = 1e6  # s
-PAYING = 1.02  # times the least error of the same measurements: below it, noise is all that is left
+PAYING = 1.02  # times the errors of the most accurate steps: within it, noise is all that is left
 
 
 @dataclass(frozen=True)
@@ -169,16 +169,24 @@ def _errors(estimator: Estimator, pairs: Sequence[tuple[Moment, Posterior]]) -> 
 
 
 def enough(points: Sequence[Point], problem: str) -> Point:
-    """The cheapest of a problem's steps whose error is that of the noise, within PAYING.
+    """The cheapest of a problem's steps that is as good as the shortest of Runge and Kutta's, within PAYING.
+
+    In angles, in forces and in how far its covariance can be trusted: more accurate steps gain what noise hides.
 
     Raises:
         PhysicsPriorError: the errors are not known.
     """
     own = [point for point in points if point.problem == problem and point.series in ("rk4", "semi_implicit_euler")]
-    if any(np.isnan(point.rmse_deg) for point in own):
+    finest = [point for point in own if point.series == "rk4"][-1]
+    if np.isnan(finest.rmse_deg):
         raise PhysicsPriorError(f"'{problem}' has no angles to score: give a --reference topic that names its joints")
-    least = min(point.rmse_deg for point in own)
-    return min((point for point in own if point.rmse_deg <= PAYING * least), key=lambda point: point.us)
+
+    def worse(point: Point) -> bool:
+        return any(
+            getattr(point, key) > PAYING * getattr(finest, key) for key in ("rmse_deg", "force_percent", "consistency")
+        )
+
+    return min((point for point in own if not worse(point)), key=lambda point: point.us)
 
 
 def card(points: Sequence[Point]) -> dict[str, Any]:
@@ -191,7 +199,7 @@ def card(points: Sequence[Point]) -> dict[str, Any]:
 def table(points: Sequence[Point]) -> Table:
     """The figures for people; what is enough is marked."""
     out = Table(
-        title=f"what accuracy costs the estimator; * is enough: cheapest within {100 * (PAYING - 1):.0f} % of the least error"
+        title=f"what accuracy costs the estimator; * is enough: cheapest step within {100 * (PAYING - 1):.0f} % of the finest"
     )
     for column in ("problem", "by", "", "us a measurement", "RMSE, deg", "consistency", "force, % of weight"):
         out.add_column(column, justify="left" if column in ("problem", "by") else "right")

@@ -52,7 +52,7 @@ def table(figures: dict[str, Any]) -> str:
     ]
     rows = [
         f"| `{each['name']}` | {_word(each['same_bits'])} | {_word(each['same_code'])}, {each['instructions']}"
-        f" | {each['instructions_more']} | {each['kernels_compiled']} |"
+        f" | {each['instructions_more']} | {each['kernels_compiled'] if each['kernels'] else 'none of its own'} |"
         for each in figures["effects"]
     ]
     return "\n".join([*head, *rows])
@@ -73,6 +73,7 @@ def _compared(effect: type[Effect], whole: dict[str, Any], without: dict[str, An
         "same_code": (whole["text"], whole["code"]) == (without["text"], without["code"]),
         "instructions": whole["instructions"],
         "instructions_more": whole["instructions"] - without["instructions"],
+        "kernels": effect.compiled is not None or len(own) > 1,
         "kernels_compiled": sum(module.startswith(tuple(own)) for module in whole["modules"]),
     }
 

@@ -9,12 +9,13 @@ import pytest
 from physics_prior.effects import REGISTRY
 from physics_prior.effects.contact import Contact
 from physics_prior.effects.drag import Drag
+from physics_prior.effects.gravity import Gravity
 from physics_prior.studies import effect_costs
 from physics_prior.studies.effect_costs import PACKAGE, remove, run_effect_costs, table
 from physics_prior.studies.effect_probe import instructions
 
 ANSWER = {"bits": "a", "text": "b", "code": "c", "instructions": 9}
-FIGURES = {"same_bits", "same_code", "instructions", "kernels_compiled", "instructions_more"}
+FIGURES = {"same_bits", "same_code", "instructions", "kernels", "kernels_compiled", "instructions_more"}
 
 
 @pytest.mark.parametrize("kind", REGISTRY)
@@ -35,6 +36,8 @@ def test_what_differs_is_told():
     same = effect_costs._compared(Drag, whole, whole)
     assert (same["same_bits"], same["same_code"], same["kernels_compiled"]) == (True, True, 1)
     assert effect_costs._compared(Contact, whole, whole)["kernels_compiled"] == 1
+    gravity = effect_costs._compared(Gravity, whole, whole)
+    assert "| 0 | none of its own |" in table({"effects": [gravity]})
     for name, figure in (("bits", "same_bits"), ("text", "same_code"), ("code", "same_code")):
         assert effect_costs._compared(Drag, whole, whole | {name: "x"})[figure] is False
     assert "| `drag` | NO | yes, 9 | 0 | 1 |" in table(

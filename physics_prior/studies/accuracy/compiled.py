@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from physics_prior.dynamics.integrators import IntegratorName
+from physics_prior.dynamics.integrators import TOLERATED, IntegratorName
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.studies.accuracy.trajectory import Setting, Trajectory, run_timed
 from physics_prior.studies.problems.mechanism import Benchmark
@@ -26,8 +26,8 @@ class Compiled:
         simulator = self._simulators.get(setting.tolerance)
         q, v = benchmark.q.copy(), benchmark.v.copy()
         if simulator is None:
-            allowed = {} if setting.tolerance is None else {"tolerance": setting.tolerance}
-            simulator = Simulator(benchmark.tree, benchmark.effects, self.integrator, **allowed)
+            allowed = TOLERATED if setting.tolerance is None else setting.tolerance
+            simulator = Simulator(benchmark.tree, benchmark.effects, self.integrator, allowed)
             simulator.begin(q, v)
             simulator.advance(q.copy(), v.copy(), 1e-6)  # loads or compiles what is timed below
             self._simulators[setting.tolerance] = simulator

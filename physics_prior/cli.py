@@ -17,6 +17,7 @@ from physics_prior.errors import PhysicsPriorError
 COMMANDS = {
     "check": ("physics_prior.commands.check", "explain a scene: its parts, effects, constraints and what a step costs"),
     "urdf": ("physics_prior.commands.urdf", "write a scene's model for RViz and other engines"),
+    "calibrate": ("physics_prior.commands.calibrate", "fit a person to a trial of markers, and write its scene"),
     "simulate": ("physics_prior.commands.simulate", "record a bag of a scene: noisy measurements and the truth"),
     "replay": ("physics_prior.commands.replay", "estimate motion and forces from a recording"),
     "effects": ("physics_prior.commands.effects", "tell which effects a recording calls for, and fit their numbers"),

@@ -27,6 +27,7 @@ ROOMS = [
     ("estimation",),
     ("interface",),
     ("recording.simulate", "recording.truth", "recording.replay", "interface.warm_up"),
+    ("calibration",),
     ("studies",),
     ("commands", "ros_inputs", "ros_parameters"),
     ("cli", "node"),

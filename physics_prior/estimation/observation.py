@@ -71,12 +71,15 @@ class Innovation:
         return H.reshape(self.H.shape), np.linalg.solve(own, self.y.reshape(-1, self.block, 1)).ravel()
 
     def squares(self, S: np.ndarray) -> np.ndarray:
-        """(m / block,) normalised innovation squared of each block alone; S (n, n) factor of the state's covariance."""
-        b, own = self.block, self._own_noise()
-        spread = (self.H @ S[: self.H.shape[1]]).reshape(-1, b, S.shape[1])
-        covariance = spread @ spread.transpose(0, 2, 1) + own @ own.transpose(0, 2, 1)
-        y = self.y.reshape(-1, b, 1)
-        return np.asarray((y.transpose(0, 2, 1) @ np.linalg.solve(covariance, y))[:, 0, 0])
+        """(m / block,) normalised innovation squared of each block alone; S (n, n) factor of the state's covariance.
+
+        In units of the noise 1 + s s^T, of which s is whitened: its eigenvalues are 1 and more, however little is known.
+        """
+        H, y = self.whitened()
+        spread = (H @ S[: H.shape[1]]).reshape(-1, self.block, S.shape[1])
+        sizes, axes = np.linalg.eigh(spread @ spread.transpose(0, 2, 1))
+        along = (axes.transpose(0, 2, 1) @ y.reshape(-1, self.block, 1))[:, :, 0]
+        return np.asarray(np.sum(along**2 / (1.0 + np.maximum(sizes, 0.0)), axis=1))
 
     def _own_noise(self) -> np.ndarray:
         """(m / block, block, block) factors of the noise of each block."""

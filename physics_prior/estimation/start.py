@@ -105,7 +105,7 @@ class Fit:
 
 
 def registered(filter: Filter, measurements: Sequence[Measurement], q: np.ndarray) -> np.ndarray:
-    """Return q (nq,) with each free body put where its markers are: by the nearest rigid motion (Arun et al. 1987).
+    """Return q (nq,) with each free body put where its markers are, by the nearest rigid motion.
 
     Whoever faces away from where the scene begins would otherwise start half a turn off, and Gauss-Newton may not find home.
     """
@@ -128,12 +128,18 @@ def registered(filter: Filter, measurements: Sequence[Measurement], q: np.ndarra
     for root, pairs in seen.items():
         if len(pairs) >= 3:
             here, there = (np.array(points) for points in zip(*pairs, strict=True))
-            U, _, Vt = np.linalg.svd((there - there.mean(axis=0)).T @ (here - here.mean(axis=0)))
-            R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+            R, t = nearest_rigid_motion(here, there)
             position, orientation = q[links[root].q][:3], q[links[root].q][3:]
-            position[:] = there.mean(axis=0) + R @ (position - here.mean(axis=0))
+            position[:] = R @ position + t
             orientation[:] = rotations.multiply(rotations.quaternion_from_matrix(R), orientation)
     return q
+
+
+def nearest_rigid_motion(here: np.ndarray, there: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """R (3, 3) and t (3,) that bring points (k, 3) nearest to others, R here + t ~ there, k >= 3 (Arun et al. 1987)."""
+    U, _, Vt = np.linalg.svd((there - there.mean(axis=0)).T @ (here - here.mean(axis=0)))
+    R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    return R, there.mean(axis=0) - R @ here.mean(axis=0)
 
 
 def _fit(filter: Filter, measurements: Sequence[Measurement], q: np.ndarray) -> Fit | None:

@@ -1,0 +1,102 @@
+"""A calibrated person as a scene file."""
+
+import textwrap
+
+import numpy as np
+
+from physics_prior.calibration.person import Calibration
+from physics_prior.dynamics.simulator import Simulator
+from physics_prior.model import JointKind
+from physics_prior.scene import MarkerSet
+
+LEAST_NOISE = 1e-3  # m: cameras and labels leave as much
+UNKNOWN = 15.0  # rad/s^2 sqrt(s) and m/s^2 sqrt(s): accelerations by what is not modelled, muscles first of all
+TONE = 10.0  # 1/s: what joints that no marker tells come to rest by
+
+
+def scene_text(found: Calibration, markers: MarkerSet, topic: str, frame_id: str, origin: str, scale: float) -> str:
+    """The text of a scene: the person, the markers of a topic where they are on it, and noise to track it by.
+
+    origin: one line that says what it was made from. scale: of the markers' noise over what is left of them in the trial.
+    """
+    human, ease = found.human, _ease(found)
+    lengths = "\n".join(
+        f"      {name}: {human.lengths[name]:.4f}  # +-{found.deviations[name]:.4f}" for name in found.informed
+    )
+    rigid = textwrap.fill(", ".join(human.rigid), 110, initial_indent="      ", subsequent_indent="      ").strip()
+    lines = []
+    for name, marker in markers.markers.items():
+        point, spread = (
+            ", ".join(f"{x + 0.0:.4f}" for x in np.round(each, 4))
+            for each in (found.places[name], found.place_deviations[name])
+        )
+        noise = scale * max(found.noise[name], LEAST_NOISE)
+        lines.append(
+            f"        - {{name: {name}, part: {marker.part}, point: [{point}], noise: {noise:.5f}}}  # +-[{spread}]"
+        )
+    pelvis = found.q[0][:7]
+    position, orientation = (", ".join(f"{x:.4f}" for x in each) for each in (pelvis[:3], pelvis[3:]))
+    return (
+        f"""# {origin}
+description: >-
+  A person of {human.mass:g} kg and {human.height:.2f} m with the markers of '{markers.name}', calibrated from
+  {found.frames} frames; they fit to {1e3 * found.rms:.1f} mm per axis, root mean square.
+frame_id: {frame_id}
+model:
+  human:
+    mass: {human.mass:g} kg
+    height: {human.height:.4f}  # +-{found.deviations["height"]:.4f}
+    sex: {human.sex}
+    table: {human.table}
+    lengths:
+{lengths}
+    rigid: [{rigid}]
+effects:
+  - gravity
+  - joint_damping:
+      # muscles that hold: a joint by itself comes to rest within {1.0 / TONE:g} s
+      coefficients:
+{_damping(found, ease)}
+measurements:
+  - points:
+      topic: {topic}
+      noise: {scale * max(found.rms, LEAST_NOISE):.5f}
+      markers:
+"""
+        + "\n".join(lines)
+        + f"""
+noise:
+  # unknown accelerations of {UNKNOWN:g} rad/s^2 sqrt(s), or m/s^2 sqrt(s), of each joint by itself
+  force:
+{_forces(found, ease)}
+  jerk: 300
+  velocity: 2
+step: {{size: 5 ms}}
+initial:
+  positions:
+    pelvis: {{position: [{position}], orientation: [{orientation}]}}
+readouts:
+  - energy: total
+"""
+    )
+
+
+def _ease(found: Calibration) -> np.ndarray:
+    """(nv,) acceleration of each freedom by a unit force on it alone, in the trial's first posture."""
+    return np.diag(np.linalg.inv(Simulator(found.human.tree(), ()).mass_matrix(found.q[0])))
+
+
+def _damping(found: Calibration, ease: np.ndarray) -> str:
+    joints = [link for link in found.human.tree().links if link.joint.kind is not JointKind.FREE]
+    return "\n".join(f"        {link.joint.name}: {TONE / np.median(ease[link.v]):.2g}" for link in joints)
+
+
+def _forces(found: Calibration, ease: np.ndarray) -> str:
+    lines = []
+    for link in found.human.tree().links:
+        own = [f"{value:.2g}" for value in UNKNOWN / ease[link.v]]
+        value = own[0] if link.joint.nv == 1 else f"[{', '.join(own)}]"
+        if link.joint.kind is JointKind.FREE:
+            value = f"{{linear: {own[0]}, angular: {own[4]}}}"
+        lines.append(f"    {link.joint.name}: {value}")
+    return "\n".join(lines)

@@ -1,0 +1,74 @@
+"""The recorded walk with every second marker gone for 0.3 s now and then, a tenth of the labels swapped for 0.1 s, and noise."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from physics_prior.estimation.estimate import Level
+from physics_prior.estimation.estimator import Estimator
+from physics_prior.estimation.history import Node
+from physics_prior.estimation.measurement import PointsMeasurement
+from physics_prior.scene import Scene, load_scene
+from physics_prior.studies.effects.likelihood import read_measurements
+
+BAG = Path(__file__).resolve().parents[2].parent / "shared" / "bags" / "lemouel_stand_walk"
+ADDED = 0.003  # m
+GAP, SWAP, EVERY = 0.3, 0.1, 0.8  # s
+GATE = chi2.ppf(0.999, 3)
+
+pytestmark = pytest.mark.skipif(not BAG.is_dir(), reason="the recording is not here")
+
+
+def degraded(frames: list[PointsMeasurement], rng: np.random.Generator) -> tuple[list[PointsMeasurement], np.ndarray]:
+    """The frames as a bad day leaves them, and (n, k) which markers a gap took."""
+    begin = frames[0].stamp
+    points = np.array([frame.points for frame in frames])
+    points += ADDED * rng.normal(size=points.shape)
+    seconds = np.array([1e-9 * (frame.stamp - begin) for frame in frames])
+    lost = np.zeros(points.shape[:2], dtype=bool)
+    count = points.shape[1]
+    for start in np.arange(0.2, seconds[-1], EVERY):
+        at = start + rng.uniform(0.0, EVERY - GAP - SWAP)
+        gap = (seconds >= at) & (seconds < at + GAP)
+        lost[np.ix_(gap, np.arange(int(rng.integers(2)), count, 2))] = True
+        swap = (seconds >= at + GAP) & (seconds < at + GAP + SWAP)
+        own = rng.permutation(count)[: max(2, count // 10)]
+        points[np.ix_(swap, own)] = points[np.ix_(swap, np.roll(own, 1))]
+    points[lost] = np.nan
+    return [replace(frame, points=each) for frame, each in zip(frames, points, strict=True)], lost
+
+
+def noisier(scene: Scene) -> Scene:
+    """The scene told of the added noise."""
+    (source,) = scene.measurements
+    markers = [each.model_copy(update={"noise": float(np.hypot(each.noise, ADDED))}) for each in source.markers]
+    return replace(scene, measurements=(source.model_copy(update={"markers": tuple(markers)}),))
+
+
+@pytest.mark.slow
+def test_a_bad_day_does_not_lose_the_walker():
+    """Gaps are bridged, and innovations are as large as expected of the noise, gated ones left out."""
+    scene = load_scene("walk_lemouel")
+    frames = read_measurements(BAG, scene)
+    bad, lost = degraded(frames, np.random.default_rng(6))
+    estimator = Estimator(noisier(scene))
+    nodes: list[Node] = []
+    estimator.on_settled = nodes.append
+    errors, levels = [], set()
+    for true, frame, gone in zip(frames, bad, lost, strict=True):
+        estimator.add(frame)
+        if estimator.ready:
+            posterior = estimator.history.nodes[-1].posterior
+            levels.add(estimator.health_of(posterior, frame.stamp).level)
+            errors.append(estimator.filter.innovation(true, posterior.state).y.reshape(-1, 3)[gone])
+    estimator.reset()
+    assert levels == {Level.OK}
+    assert sum(node.posterior.start for node in nodes) == 1  # never started anew
+    assert np.sqrt(np.mean(np.sum(np.concatenate(errors) ** 2, axis=1))) < 0.025  # measured: 8.1 mm
+    used = [node.posterior for node in nodes if node.posterior.used]
+    ratio = sum(each.nis for each in used) / sum(each.dimension for each in used)
+    # what passes the gate of 0.999 has a mean of 0.995 of what all had; measured: 0.990
+    assert ratio == pytest.approx(chi2.cdf(GATE, 5) / chi2.cdf(GATE, 3), abs=0.01)

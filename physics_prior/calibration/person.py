@@ -123,7 +123,7 @@ class _Fit:
         if not on:
             return np.zeros(len(stamps), dtype=bool)
         speed = np.linalg.norm(np.gradient(points[:, on], stamps, axis=0), axis=2).max(axis=1)
-        return np.nan_to_num(speed, nan=np.inf) < STILL
+        return np.asarray(np.nan_to_num(speed, nan=np.inf) < STILL)
 
     def _share(self, name: str) -> float:
         """A length over stature, by the table."""

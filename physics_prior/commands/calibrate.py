@@ -15,12 +15,12 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from physics_prior.commands.terminal import STDOUT, console, progress, require_folder, table, whole_file, write_json
 from physics_prior.errors import PhysicsPriorError
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from physics_prior.calibration import Calibration
 
 FIELDS = ("mass", "sex", "height", "table")
@@ -101,8 +101,10 @@ def _subject(text: str) -> dict[str, Any]:
     return out
 
 
-def _trial(bag: Path, topic: str) -> tuple[np.ndarray, np.ndarray, str]:
+def _trial(bag: Path, topic: str) -> "tuple[np.ndarray, np.ndarray, str]":
     """Stamps (n,) ns and markers (n, k, 3) m of a bag in order, and their frame; what cannot be read is left out."""
+    import numpy as np
+
     from physics_prior.interface.geometry import NANOSECONDS, array_of
     from physics_prior.recording.cdr import decode
     from physics_prior.recording.messages import PoseArray

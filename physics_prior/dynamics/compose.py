@@ -19,14 +19,13 @@ from types import ModuleType
 import numpy as np
 
 from physics_prior.dynamics.integrators import INTEGRATORS, IntegratorName
-from physics_prior.dynamics.kernel import cache_directory, inline_kernel
+from physics_prior.dynamics.kernel import cache_directory, inline_kernel, sources_digest
 from physics_prior.dynamics.types import Array
 from physics_prior.effects.effect import Effect
 from physics_prior.model import Tree
 
 ROOM = "physics_prior.dynamics"
 GRAVITY = 3  # numbers at the head of the parameters
-MOST_SOURCES = 500  # files of a user's package that are read for its digest
 FUNCTIONS = {
     "apply": ("forces", "links, work, q, v, tau", "{}"),
     "differentiate": ("differentiate_forces", "links, work, freedoms, composites, q, v, tau_q, tau_v", "{}"),
@@ -76,7 +75,7 @@ def step_source(
                 continue
             function = getattr(force, each).py_func
             # a user's effect stands outside the folders that key the cache: its own digest makes an edit miss
-            digest = _sources_digest(Path(function.__code__.co_filename))
+            digest = sources_digest(Path(function.__code__.co_filename))
             source_of = f"from {function.__module__} import {function.__name__}"
             if source_of not in names:
                 taken = sum(other.endswith(f" import {function.__name__}") for other in names)
@@ -123,20 +122,6 @@ def step_module(
     sys.modules[name] = module
     spec.loader.exec_module(module)
     return module
-
-
-def _sources_digest(file: Path) -> str:
-    """A digest of an effect's file and, of a user's, of all of the package that it is in: kernels may call others there."""
-    top = file.parent
-    while (top.parent / "__init__.py").is_file():
-        top = top.parent
-    own = Path(__file__).resolve().parents[1]  # whose kernels key the cache already
-    alone = not (top / "__init__.py").is_file() or top.resolve() == own
-    sources = [file] if alone else sorted(top.rglob("*.py"))[:MOST_SOURCES]
-    digest = hashlib.sha256()
-    for source in sources:
-        digest.update(source.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def _text(name: str) -> str:

@@ -19,6 +19,7 @@ FASTMATH = {"nsz"}
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
+MOST_SOURCES = 500  # files of a user's package that are read for its digest
 _CALLBACKS: list[Any] = []  # what must not be collected
 _KERNEL_ROOMS = ("dynamics", "effects", "estimation")
 
@@ -68,6 +69,24 @@ def cache_directory() -> Path:
     return Path(home) / digest.hexdigest()[:16]
 
 
+def sources_digest(file: Path) -> str:
+    """A digest of a file with kernels and, of a user's, of all of the package that it is in: kernels call others there."""
+    folder = _users_package(file)
+    digest = hashlib.sha256()
+    for source in [file] if folder is None else sorted(folder.rglob("*.py"))[:MOST_SOURCES]:
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _users_package(file: Path) -> Path | None:
+    """The folder of the package that a file is in; None where it is in none, or in this one, which keys the cache already."""
+    top = file.resolve().parent
+    while (top.parent / "__init__.py").is_file():
+        top = top.parent
+    own = Path(__file__).resolve().parents[1]
+    return top if (top / "__init__.py").is_file() and top != own else None
+
+
 def kernel(function: Function) -> Function:
     """Compile a function of the step: no Python in it, cached on disk, IEEE division, NaN visible."""
     return _compile(function, inline=False)
@@ -81,7 +100,9 @@ def inline_kernel(function: Function) -> Function:
 @cache
 def callback(function: Callable[..., Any], signature: Any) -> int:
     """Compile a function for calls through its address, and return that; it stays valid while the program runs."""
-    compiled = _in_cache(lambda: numba.cfunc(signature, cache=True, error_model="numpy", fastmath=FASTMATH)(function))
+    compiled = _in_cache(
+        lambda: numba.cfunc(signature, cache=True, error_model="numpy", fastmath=FASTMATH)(function), cache_directory()
+    )
     _CALLBACKS.append(compiled)
     return int(compiled.address)
 
@@ -89,14 +110,17 @@ def callback(function: Callable[..., Any], signature: Any) -> int:
 def _compile(function: Function, inline: bool) -> Function:
     options = {"error_model": "numpy", "fastmath": FASTMATH, "forceinline": inline, "boundscheck": False}
     # nobody calls a kernel through C: without that entry each compiles faster
-    compiled: Function = _in_cache(lambda: numba.njit(cache=True, no_cfunc_wrapper=True, **options)(function))
+    file, folder = Path(function.__code__.co_filename), cache_directory()
+    if _users_package(file) is not None:
+        folder /= sources_digest(file)
+    compiled: Function = _in_cache(lambda: numba.njit(cache=True, no_cfunc_wrapper=True, **options)(function), folder)
     return compiled
 
 
-def _in_cache(decorate: Callable[[], Any]) -> Any:
+def _in_cache(decorate: Callable[[], Any], folder: Path) -> Any:
     # Numba reads its cache directory when it decorates: set it for our functions only
     before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(cache_directory())
+    numba.config.CACHE_DIR = str(folder)
     try:
         return decorate()
     finally:

@@ -1,13 +1,16 @@
 """A user's effect in a package of its own: the very text of docs/effects.md, found through its entry point."""
 
 import importlib
+import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import physics_prior
 from physics_prior.dynamics.compose import step_source
 from physics_prior.errors import SceneError
 from physics_prior.estimation.process import PhysicsProcess
@@ -18,6 +21,7 @@ PAGE = (Path(__file__).resolve().parents[2] / "docs" / "effects.md").read_text(e
 CODE, CHECK = re.findall(r"^```py\n(.*?)^```", PAGE, flags=re.DOTALL | re.MULTILINE)
 (SCENE,) = re.findall(r"^```yaml\n(.*?)^```", PAGE, flags=re.DOTALL | re.MULTILINE)
 (TABLE,) = re.findall(r"^```toml\n(.*?)^```", PAGE, flags=re.DOTALL | re.MULTILINE)
+PACKAGE = Path(physics_prior.__file__).parent
 GROUP, OFFER = TABLE.replace('"', "").splitlines()
 
 
@@ -128,3 +132,17 @@ def test_broken_effects_are_one_sentence_at_the_line_of_the_scene(install, code,
 def test_scenes_that_do_not_name_a_broken_effect_do_not_notice(install):
     install("1/0")
     assert load_scene("pendulum").effects
+
+
+def test_an_edit_of_a_kernel_that_an_effects_kernel_calls_is_noticed(install):
+    """In a package's other file, by the next process: Numba alone would run what it had inlined before."""
+    head, told = "from physics_prior.dynamics.kernel import kernel\n", []
+    wind = f"{head}from kites.air import f\n@kernel\ndef g(x):\n    return f(x)\n"
+    folder = install(wind).parent
+    command = [sys.executable, "-c", "from kites.wind import g; print(g(1.0))"]
+    paths = os.pathsep.join([str(PACKAGE.parent), str(folder)])
+    environment = os.environ | {"PYTHONPATH": paths, "PHYSICS_PRIOR_CACHE": str(folder / "cache")}
+    for factor in ("1.0", "2.0"):
+        (folder / "kites" / "air.py").write_text(f"{head}@kernel\ndef f(x):\n    return {factor} * x\n")
+        told.append(subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout.strip())
+    assert told == ["1.0", "2.0"]

@@ -1,26 +1,33 @@
-"""Tell which effects a recording calls for, and how strong they are.
+"""Tell which effects recordings call for, and how strong they are.
 
-Each effect of the scene is left out in turn, and each one proposed with --try is added with its numbers fitted; what that does
-to the likelihood of the recording decides, against what chance would give (the Bayesian information criterion). --fit
-estimates numbers of the scene by maximum likelihood, with 95 % intervals, and has them free in every comparison. Without
+All effects of the scene and each one proposed with --try are fitted together: their strengths (coefficients of damping, of
+friction, of drag, stiffnesses), whatever --fit names, and nothing that --hold names. Then each effect is left out in turn, all
+else fitted anew; what that does to the likelihood of the recordings decides, against what chance would give (the Bayesian
+information criterion). Sides that an effect can do without, such as the friction of a contact, are tried as effects are. Fitted
+numbers of the scene that remains come with 95 % intervals. Of several bags each counts as much as its measurements do. Without
 BAG the scene's own simulated motion is used, which tells what a recording could. An effect that is left out or added makes
 another step, which is compiled once.
 
-A path names a number of the scene file: model.parts.link1.mass, noise.force, effects.gravity.acceleration.2 (the third of a
-list), effects.joint_damping.coefficients.pivot (an effect by its kind or name).
+A path names a number of the scene file, or a list or mapping of them: model.parts.link1.mass, noise.force,
+measurements.0.pose.scale (of lengths), effects.gravity.acceleration (its size and direction; .2 is its third number),
+effects.joint_damping.coefficients.pivot (an effect by its kind or name).
 
 Examples:
   physics-prior effects uw_double_pendulum my_bag --try "drag: {part: link2, linear: 1e-4 N s/m}"
-  physics-prior effects double_pendulum bags/double_pendulum --fit effects.gravity.acceleration.2 --json -
+  physics-prior effects cube_toss toss_1 toss_2 --fit measurements.0.pose.scale
+  physics-prior effects double_pendulum bags/double_pendulum --fit effects.gravity.acceleration --json -
 """
 
 import argparse
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from physics_prior.commands.terminal import STDOUT, console, progress, require_folder, table, whole_file, write_json
 from physics_prior.errors import PhysicsPriorError
+
+if TYPE_CHECKING:
+    from physics_prior.scene import Scene
 
 SIMULATED_SECONDS = 5.0
 
@@ -28,7 +35,7 @@ SIMULATED_SECONDS = 5.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the arguments of `effects`."""
     parser.add_argument("scene", metavar="SCENE", help="a scene file, or the name of a shipped scene")
-    parser.add_argument("bag", metavar="BAG", nargs="?", type=Path, help="the recording; simulated where there is none")
+    parser.add_argument("bags", metavar="BAG", nargs="*", type=Path, help="recordings; simulated where there is none")
     parser.add_argument(
         "--try",
         dest="proposed",
@@ -38,6 +45,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="an effect, as a scene would have it",
     )
     parser.add_argument("--fit", metavar="PATH", nargs="+", default=[], help="numbers of the scene file to estimate")
+    parser.add_argument(
+        "--hold", metavar="PATH", nargs="+", default=[], help="strengths that are known: they are not fitted"
+    )
+    parser.add_argument("--reference", metavar="TOPIC", help="a JointState topic of the bags to compare estimates with")
     parser.add_argument("--seed", type=int, default=0, help="of the simulated recording (0)")
     parser.add_argument("--plot", metavar="FILE", type=Path, help="draw the evidence: .png, .svg or .pdf")
     parser.add_argument("--json", metavar="FILE", help="write the figures as JSON; - prints that and nothing else")
@@ -51,13 +62,14 @@ def run(args: argparse.Namespace) -> int:
     from physics_prior.interface.warm_up import warm_up
     from physics_prior.studies.effects.ablation import ablate
     from physics_prior.studies.effects.drawing import draw
-    from physics_prior.studies.effects.fit import Fitted, fit
     from physics_prior.studies.effects.likelihood import read_measurements, simulated_measurements
     from physics_prior.studies.effects.variant import SceneText
     from physics_prior.studies.plot import require_format
 
     if args.plot is not None:
         require_format(args.plot)
+    if args.reference is not None and not args.bags:
+        raise PhysicsPriorError("--reference needs a BAG that holds the topic: a simulated motion has none")
     text = SceneText.read(args.scene)
     proposed = [_entry(each) for each in args.proposed]
     scene = text.build()
@@ -65,17 +77,16 @@ def run(args: argparse.Namespace) -> int:
         raise PhysicsPriorError(f"scene '{scene.name}' measures nothing: add 'measurements' to study its effects")
     with compiling(scene, "carry"):
         warm_up(scene)
-    if args.bag is None:
-        measurements = simulated_measurements(scene, args.seed, SIMULATED_SECONDS)
-    else:
-        measurements = read_measurements(args.bag, scene)
-    fitted: list[Fitted] = []
-    if args.fit:
-        with progress(f"fitting {len(args.fit)} numbers") as report:
-            found = fit(text, args.fit, measurements, lambda count: report(0.0, f"fitting, replay {count}"))
-        fitted, text = found.parameters, found.scene
+    recordings = [read_measurements(bag, scene) for bag in args.bags]
+    if not recordings:
+        recordings = [simulated_measurements(scene, args.seed, SIMULATED_SECONDS)]
+
+    def scored(variant: "Scene") -> float | None:
+        return _error(variant, args.bags, args.reference)
+
     with progress("effects") as report:
-        verdicts = ablate(text, measurements, proposed, args.fit, report)
+        study = ablate(text, recordings, proposed, args.fit, args.hold, scored, report)
+        verdicts, fitted = study.verdicts, study.fit.parameters()
     if args.plot is not None:
         with whole_file(args.plot) as partial:
             draw(verdicts, fitted, partial)
@@ -96,24 +107,43 @@ def _entry(text: str) -> Any:
     return place.value["effects"][0]
 
 
+def _error(scene: "Scene", bags: list[Path], reference: str | None) -> float | None:
+    """Root mean square error of angles, deg, or else of lengths, m, against a reference; None where there is none."""
+    from physics_prior.recording.replay import replay
+
+    if reference is None:
+        return None
+    errors = []
+    for bag in bags:
+        score = replay(bag, scene, reference=reference).score or {}
+        error = score.get("position_rmse_deg") or score.get("position_rmse_m")
+        if error is not None:
+            errors.append(error)
+    return math.sqrt(sum(error**2 for error in errors) / len(errors)) if errors else None
+
+
 def _figures(each: Any) -> dict[str, Any]:
     ends = [end if math.isfinite(end) else None for end in (each.low, each.high)]
-    return {"path": each.path, "start": each.start, "value": each.value, "interval95": ends}
+    error = each.model_error if math.isfinite(each.model_error) else None
+    return {"path": each.path, "start": each.start, "value": each.value, "interval95": ends, "model_error": error}
 
 
 def _print(verdicts: Any, fitted: Any) -> None:
     out = console()
     if fitted:
-        rows = table("fitted numbers", "path", "file", "estimate", "95 % interval", numbers=3)
+        rows = table("fitted numbers", "path", "file", "estimate", "95 % interval", "model error", numbers=4)
         for each in fitted:
             interval = f"{each.low:.5g} to {each.high:.5g}" if math.isfinite(each.low) else "not determined"
-            rows.add_row(each.path, f"{each.start:.5g}", f"{each.value:.5g}", interval)
+            error = f"{each.model_error:.2f}" if math.isfinite(each.model_error) else "-"
+            rows.add_row(each.path, f"{each.start:.5g}", f"{each.value:.5g}", interval, error)
         out.print(rows)
         out.print()
-    rows = table(
-        "effects", "effect", "log-likelihood", "needed", "us a step", "NIS with, without", "forecast", numbers=5
-    )
+    columns = ["log-likelihood", "needed", "us a step", "NIS with, without", "forecast"]
+    scored = any(each.rmse_with is not None for each in verdicts)
+    columns += ["RMSE"] if scored else []
+    rows = table("effects", "effect", *columns, numbers=len(columns))
     for each in verdicts:
+        rmse = [f"{_shown(each.rmse_with, '.3g')}, {_shown(each.rmse_without, '.3g')}"] if scored else []
         rows.add_row(
             f"{each.name} (proposed)" if each.proposed else each.name,
             _shown(each.delta_log_likelihood, "+.4g"),
@@ -121,6 +151,7 @@ def _print(verdicts: Any, fitted: Any) -> None:
             _shown(each.us_per_step, ".2g"),
             f"{_shown(each.nis_with, '.3f')}, {_shown(each.nis_without, '.3f')}",
             f"{_shown(each.forecast_with, '.3g')}, {_shown(each.forecast_without, '.3g')}",
+            *rmse,
         )
     out.print(rows)
     out.print()

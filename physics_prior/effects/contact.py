@@ -22,6 +22,7 @@ class Contact(Effect):
     """A part against the ground, or against another part: normal force, Coulomb friction, restitution (design eq. 8)."""
 
     kind: ClassVar[str] = "contact"
+    strengths: ClassVar[tuple[str, ...]] = ("friction", "rolling", "restitution")
 
     part: str = Field(description="the part that is pushed; the published force acts on it")
     shape: Literal["sphere", "capsule", "box", "ellipsoid"] | None = Field(

@@ -78,6 +78,7 @@ class Drag(Effect):
 
     kind: ClassVar[str] = "drag"
     compiled: ClassVar[CompiledForce | None] = CompiledForce(apply_drag, differentiate_drag)
+    strengths: ClassVar[tuple[str, ...]] = ("linear", "quadratic", "angular")
 
     part: str = Field(description="the part that moves through the medium")
     point: Point = Field(default=(0.0, 0.0, 0.0), description="m, in the frame of `part`: where the force acts")

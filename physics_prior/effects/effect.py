@@ -98,6 +98,9 @@ class Effect(BaseModel):
     compiled: ClassVar[CompiledForce | None] = None
     words: ClassVar[frozenset[str]] = frozenset()
     """Texts that may stand where its fields have quantities."""
+    strengths: ClassVar[tuple[str, ...]] = ()
+    """Fields, a number >= 0 or one per joint, that say how strongly it acts, so that a recording may be asked for them: where one
+    is zero that side of the effect is not there."""
 
     name: str = Field(default="", description="name of its outputs, unique in the scene; the kind where left out")
 

@@ -40,6 +40,7 @@ class JointDamping(Effect):
 
     kind: ClassVar[str] = "joint_damping"
     compiled: ClassVar[CompiledForce | None] = CompiledForce(apply_joint_damping, differentiate_joint_damping)
+    strengths: ClassVar[tuple[str, ...]] = ("coefficients",)
 
     coefficients: dict[str, Annotated[float, Field(ge=0.0)]] = Field(
         min_length=1, description="joint name -> N m s/rad (revolute, spherical) or N s/m (prismatic); >= 0"

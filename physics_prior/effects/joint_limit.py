@@ -16,6 +16,7 @@ class JointLimit(Effect):
     """Hard stops at the ends of joints' ranges: inequality rows 0 <= q - lower and 0 <= upper - q (design eq. 8)."""
 
     kind: ClassVar[str] = "joint_limit"
+    strengths: ClassVar[tuple[str, ...]] = ("restitution",)
 
     lower: dict[str, float] = Field(default={}, description="joint name -> rad (revolute) or m (prismatic)")
     upper: dict[str, float] = Field(default={}, description="joint name -> rad (revolute) or m (prismatic)")

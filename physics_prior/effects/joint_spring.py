@@ -97,6 +97,7 @@ class JointSpring(Effect):
     compiled: ClassVar[CompiledForce | None] = CompiledForce(
         apply_joint_spring, differentiate_joint_spring, joint_spring_energy
     )
+    strengths: ClassVar[tuple[str, ...]] = ("stiffness", "damping")
 
     stiffness: Coefficients = Field(
         min_length=1, description="joint name -> N m/rad (revolute, spherical) or N/m (prismatic); >= 0"

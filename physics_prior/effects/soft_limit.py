@@ -95,6 +95,7 @@ class SoftLimit(Effect):
     compiled: ClassVar[CompiledForce | None] = CompiledForce(
         apply_soft_limit, differentiate_soft_limit, soft_limit_energy
     )
+    strengths: ClassVar[tuple[str, ...]] = ("stiffness", "damping")
 
     lower: dict[str, float] = Field(default={}, description="joint name -> rad (revolute) or m (prismatic)")
     upper: dict[str, float] = Field(default={}, description="joint name -> rad (revolute) or m (prismatic)")

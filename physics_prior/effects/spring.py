@@ -102,6 +102,7 @@ class Spring(TwoPoints):
 
     kind: ClassVar[str] = "spring"
     compiled: ClassVar[CompiledForce | None] = CompiledForce(apply_spring, differentiate_spring, spring_energy)
+    strengths: ClassVar[tuple[str, ...]] = ("stiffness", "damping")
 
     stiffness: float = Field(ge=0.0, description="N/m; >= 0")
     rest_length: float = Field(default=0.0, ge=0.0, description="m, length at which it does not pull")

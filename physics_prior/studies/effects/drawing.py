@@ -58,13 +58,17 @@ def _evidence(verdicts: Sequence[Verdict], axes: Axes) -> None:
 
 def _intervals(fitted: Sequence[Fitted], axes: Axes) -> None:
     for row, each in enumerate(fitted):
-        if math.isfinite(each.low):
-            ends = sorted((each.low / each.value, each.high / each.value))
+        known = math.isfinite(each.low)
+        scale = max(abs(each.value), 0.5 * (each.high - each.low) if known else 0.0) or 1.0
+        if known:
+            ends = [(end - each.value) / scale for end in (each.low, each.high)]
             axes.plot(ends, [row, row], color=KEPT, lw=2.0)
-        axes.plot(1.0, row, "o", color=KEPT, ms=5)
-        axes.plot(each.start / each.value, row, "|", color=INK, ms=12)
-        axes.annotate(f"{each.value:.5g}", (1.0, row), (0, 7), textcoords="offset points", ha="center", fontsize=8)
+        axes.plot(0.0, row, "o", color=KEPT, ms=5)
+        axes.plot((each.start - each.value) / scale, row, "|", color=INK, ms=12)
+        axes.annotate(f"{each.value:.5g}", (0.0, row), (0, 7), textcoords="offset points", ha="center", fontsize=8)
     axes.set_yticks(range(len(fitted)), [each.path for each in fitted], fontsize=8)
     axes.set_ylim(len(fitted) - 0.4, -0.6)
-    axes.set_xlabel("relative to the estimate: 95 % interval, and the file's value (mark)", fontsize=8)
+    axes.set_xlabel(
+        "95 % interval and the file's value (mark), in parts of the estimate, or of half the interval", fontsize=8
+    )
     axes.set_title("fitted numbers", loc="left", fontsize=9)

@@ -1,37 +1,45 @@
-"""Parameters of a scene by maximum likelihood of a recording, with what the recording tells of them.
+"""Parameters of a scene by maximum likelihood of recordings, with what the recordings tell of them.
 
-Each is fitted as a factor on what the scene file says, in the logarithm, so that it keeps its sign. Intervals come from the
-curvature of the likelihood at its maximum (the observed information): they hold as far as the model does.
+Two deviations are reckoned with. What chance leaves open is the curvature of the likelihood at its maximum, H (the observed
+information). That holds as far as the model does: where the model is wrong, parts of the recording pull the numbers farther apart
+than chance would, and the deviation is that of the sandwich (Huber 1967, White 1982)
+
+    H^-1 J H^-1,        J: sum of g g^T over parts of the recording, g the slopes of each part's own likelihood,
+
+which says how far the estimate would move if it were made from other such parts. An interval has the larger of the two.
 """
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from scipy.stats import norm
 
-from physics_prior.errors import SimulationError
-from physics_prior.estimation.measurement import Measurement
-from physics_prior.studies.effects.likelihood import likelihood
+from physics_prior.errors import SceneError, SimulationError
+from physics_prior.studies.effects.likelihood import Likelihood, Recordings, likelihood
+from physics_prior.studies.effects.parameter import FARTHEST, WIDEST, Parameter, parameters
+from physics_prior.studies.effects.search import IMPOSSIBLE, Box, Minimum, descend, slopes
 from physics_prior.studies.effects.variant import SceneText
 
-WIDEST = math.log(1e3)  # a factor is sought between 1/1000 and 1000
-FIRST_WIDTH, NARROWEST, WIDTH = 0.03, 1e-4, 0.3  # of the logarithm: differences at first, at least and at most
-FARTHEST, FLATTEST = 0.5, 1e-3  # steps of the logarithm at most; least curvature that counts, of unit diagonals
-GAIN, PASSES = 0.01, 15  # of log-likelihood, below which a search ends, and how many steps it may take
 CONFIDENCE = 0.95
-FAR, MOST_REFUSED = 1.5, 50  # NIS, and rows a refused measurement, beyond which a start is too far off for a search
-WIDENINGS = (16.0, 4.0, 1.0)  # of all noise, from such a start: what fits nowhere has no slope to follow
-IMPOSSIBLE = 1e12  # minus the log-likelihood of a motion that leaves the numbers
+FAR, MOST_REFUSED = 1.5, 300  # NIS, and rows a refused measurement, beyond which a start is too far off for a search
+WIDER = (
+    1.0,
+    2.0,
+    4.0,
+)  # differences, in deviations: through impacts a likelihood is rough, and may have no curvature at less
+WIDENINGS = (16.0, 4.0)  # of all noise, from such a start: what fits nowhere has no slope to follow
+
+Told = Callable[[int], None]
 
 
 @dataclass(frozen=True)
 class Fitted:
     """A parameter: its path in the scene file, the file's value, the estimate and the ends of its 95 % interval.
 
-    All in the unit of the file. The ends are NaN where the recording does not determine it.
+    All in the unit of the file. The ends are NaN where the recording does not determine it. model_error: how many
+    times what chance would the parts of the recording pull it apart; the interval is so much wider where that is above 1.
     """
 
     path: str
@@ -39,116 +47,176 @@ class Fitted:
     value: float
     low: float
     high: float
+    model_error: float
 
 
-@dataclass(frozen=True)
 class Fit:
-    """Fitted parameters, the scene that they make and the log-likelihoods before (NaN if there was none) and after."""
+    """A scene with its free numbers at their best.
 
-    parameters: list[Fitted]
-    scene: SceneText
-    before: float
-    after: float
-
-
-def fit(
-    scene: SceneText,
-    paths: Sequence[str],
-    measurements: Sequence[Measurement],
-    told: Callable[[int], None] = lambda count: None,
-) -> Fit:
-    """Fit the numbers at some paths of a scene to measurements; told is told how many replays were made.
-
-    Raises:
-        SceneError: a path leads to no number that can be scaled; SimulationError: no values follow the recording.
+    Attributes:
+        found: what the likelihood makes of it.
+        minimum: where the search ended.
     """
-    start = np.array([scene.number(path) for path in paths])
-    replays = 0
 
-    def cost(logarithms: np.ndarray, widening: float = 1.0) -> float:
-        nonlocal replays
-        replays += 1
-        told(replays)
-        found = likelihood(_changed(scene, paths, logarithms).noisier(widening).build(), measurements)
+    def __init__(self, problem: "Problem", minimum: Minimum) -> None:
+        self.problem, self.minimum = problem, minimum
+        found = problem.likelihood(minimum.x)
+        assert found is not None
+        self.found = found
+
+    @property
+    def scene(self) -> SceneText:
+        """The scene that the fitted numbers make."""
+        return self.problem.scene_at(self.minimum.x)
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The fitted numbers by path."""
+        return self.problem.numbers(self.minimum.x)
+
+    def parameters(self) -> list[Fitted]:
+        """The fitted numbers with their intervals; takes some replays more."""
+        problem, x = self.problem, self.minimum.x
+        if not len(x):
+            return []
+        z = float(norm.ppf(0.5 + 0.5 * CONFIDENCE))
+        halves, errors = np.full(len(x), math.inf), np.full(len(x), math.nan)
+        for wider in WIDER:
+            widths = wider * self.minimum.widths
+            gradient, curvature, _ = slopes(problem.cost, problem.box, x, self.minimum.cost, widths, None)
+            inside = (x > problem.box.lowest) | (gradient <= 0.0)
+            told = inside & (np.diag(curvature) > 1.0 / problem.box.highest**2)  # what moves nothing has no interval
+            chance = _covariance(curvature[np.ix_(told, told)])
+            if np.isfinite(chance).all():
+                break
+        if np.isfinite(chance).all():
+            scores = problem.scores(x, widths)[:, told]
+            J = scores.T @ scores * (len(scores) / (len(scores) - 1.0))
+            deviations = np.sqrt(np.diag(chance))
+            errors[told] = np.sqrt(np.diag(chance @ J @ chance)) / deviations
+            halves[told] = z * deviations * np.maximum(1.0, errors[told])
+        for i in np.flatnonzero(~inside):  # at zero: up to where the cost has risen by z^2 / 2
+            slope, curved = gradient[i], max(curvature[i, i], 0.0)
+            halves[i] = z**2 / (slope + math.sqrt(slope**2 + z**2 * curved))
+        return [
+            Fitted(each.path, each.start, each.number(float(at)), *each.interval(float(at), float(half)), float(error))
+            for each, at, half, error in zip(problem.parameters, x, halves, errors, strict=True)
+        ]
+
+
+class Problem:
+    """Numbers of a scene that are free, and recordings that are to tell them.
+
+    Attributes:
+        scene: the scene as it stands, from which all coordinates count.
+        parameters: the free numbers; box: what the search may do with them.
+        replays: how many replays of all recordings were made.
+    """
+
+    def __init__(
+        self,
+        scene: SceneText,
+        free: Sequence[Parameter],
+        recordings: Recordings,
+        told: Told = lambda count: None,
+    ) -> None:
+        self.scene, self.parameters, self.recordings, self.told = scene, list(free), recordings, told
+        self.replays, self.widening = 0, 1.0
+        self._known: dict[tuple[float, bytes], Likelihood | None] = {}
+        self.box = Box(
+            np.array([each.lowest for each in free]),
+            np.array([each.highest for each in free]),
+            np.array([FARTHEST[each.kind] for each in free]),
+            np.array([WIDEST[each.kind] for each in free]),
+        )
+
+    def numbers(self, x: np.ndarray) -> dict[str, float]:
+        """The numbers by path at coordinates x (k,)."""
+        return {each.path: each.number(float(value)) for each, value in zip(self.parameters, x, strict=True)}
+
+    def scene_at(self, x: np.ndarray) -> SceneText:
+        """The scene at coordinates x (k,)."""
+        return self.scene.changed(self.numbers(x))
+
+    def likelihood(self, x: np.ndarray) -> Likelihood | None:
+        """The likelihood at coordinates x (k,); None where the scene cannot be or cannot follow the recordings."""
+        key = (self.widening, x.tobytes())
+        if key not in self._known:
+            self.replays += 1
+            self.told(self.replays)
+            try:
+                scene = self.scene_at(x).noisier(self.widening).build()
+                self._known[key] = likelihood(scene, self.recordings)
+            except SceneError:  # an inertia that is none, a restitution above 1
+                self._known[key] = None
+        return self._known[key]
+
+    def cost(self, x: np.ndarray) -> float:
+        """Minus the log-likelihood at coordinates x (k,)."""
+        found = self.likelihood(x)
         return IMPOSSIBLE if found is None else -found.log
 
-    best = np.zeros(len(paths))
-    first = likelihood(scene.build(), measurements)
-    before = math.nan if first is None else first.log
-    near = first is not None and first.nis < FAR and first.refused * MOST_REFUSED <= first.rows
-    widths = np.full(len(paths), FIRST_WIDTH)
-    for widening in (1.0,) if near else WIDENINGS:
-        best, widths, curvature = _climb(partial(cost, widening=widening), best, widths)
-    lowest = cost(best)
-    if lowest == IMPOSSIBLE:
-        raise SimulationError(
-            f"{scene.path}: no values of {list(paths)} were found with which it follows the recording"
-        )
-    deviations = _deviations(curvature)
-    z = float(norm.ppf(0.5 + 0.5 * CONFIDENCE))
-    parameters = []
-    for path, number, logarithm, deviation in zip(paths, start, best, deviations, strict=True):
-        value = float(number * math.exp(logarithm))
-        wide = not deviation * z < WIDEST
-        ends = (
-            sorted((value * math.exp(-z * deviation), value * math.exp(z * deviation))) if not wide else [math.nan] * 2
-        )
-        parameters.append(Fitted(path, float(number), value, ends[0], ends[1]))
-    return Fit(parameters, _changed(scene, paths, best), before, -lowest)
+    def scores(self, x: np.ndarray, widths: np.ndarray) -> np.ndarray:
+        """(parts, k) slopes of each part's own log-likelihood at x, about their mean."""
+        columns = []
+        for i, width in enumerate(widths):
+            ends = [x.copy(), x.copy()]
+            ends[0][i] += width
+            ends[1][i] = max(x[i] - width, self.box.lowest[i])
+            ahead, behind = (self.likelihood(end) for end in ends)
+            if ahead is None or behind is None:
+                return np.full((2, len(x)), math.nan)
+            columns.append((ahead.parts - behind.parts) / (ends[0][i] - ends[1][i]))
+        scores = np.array(columns).T
+        return np.asarray(scores - scores.mean(axis=0))
+
+    def solve(self, begin: Minimum | None = None) -> Fit:
+        """The fit, searched from the scene as it stands or from that of a larger one, less well where it is far worse.
+
+        Where the beginning is far off, noises are widened first and narrowed again on the way.
+
+        Raises:
+            SceneError: the scene as it stands is not valid; SimulationError: no values follow the recordings.
+        """
+        x = np.zeros(len(self.parameters)) if begin is None else begin.x
+        try:
+            if self.parameters and not self._near(x):
+                begin = None
+                for self.widening in WIDENINGS:
+                    x = descend(self.cost, self.box, x=x).x
+            self.widening = 1.0
+            minimum = descend(self.cost, self.box, begin, x)
+        except SimulationError:
+            paths = [each.path for each in self.parameters]
+            values = f"no values of {paths} were found with which it follows" if paths else "it does not follow"
+            raise SimulationError(f"{self.scene.path}: {values} the recording") from None
+        finally:
+            self.widening = 1.0
+        return Fit(self, minimum)
+
+    def _near(self, x: np.ndarray) -> bool:
+        found = self.likelihood(x)
+        return found is not None and found.nis < FAR and found.refused * MOST_REFUSED <= found.rows
+
+    def reduced(self, scene: SceneText, chosen: Sequence[int], minimum: Minimum) -> tuple["Problem", Minimum]:
+        """The same for another scene with some of the numbers, by index, and where to begin with it."""
+        places = np.array(chosen, dtype=int)
+        smaller = Problem(scene, [self.parameters[place] for place in chosen], self.recordings, self.told)
+        return smaller, minimum.subset(places)
 
 
-def _changed(scene: SceneText, paths: Sequence[str], logarithms: np.ndarray) -> SceneText:
-    return scene.scaled({path: math.exp(each) for path, each in zip(paths, logarithms, strict=True)})
+def fit(scene: SceneText, paths: Sequence[str], recordings: Recordings, told: Told = lambda count: None) -> Fit:
+    """Fit the numbers at some paths of a scene, and nothing else.
 
-
-def _climb(
-    cost: Callable[[np.ndarray], float], x: np.ndarray, widths: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Newton's method from x (k,): where the cost is least, a deviation of each number there, and the curvature (k, k).
-
-    Differences are central and as wide as a deviation (widths, from the pass before): narrower, they would meet the
-    roughness of the gate, and of one side only, they would shift the minimum by half their width.
+    Raises:
+        SceneError: a path leads to no number that can be moved; SimulationError: no values follow the recordings.
     """
-    here = cost(x)
-    for _ in range(PASSES):
-        gradient, curvature = _slopes(cost, x, here, widths)
-        curved = np.diag(curvature)
-        widths = np.clip(1.0 / np.sqrt(np.maximum(curved, 1e-6)), NARROWEST, WIDTH)
-        scale = np.sqrt(np.maximum(np.abs(curved), 1e-6))  # of a unit curvature, in which directions are alike
-        values, vectors = np.linalg.eigh(curvature / np.outer(scale, scale))
-        downhill = vectors.T @ (gradient / scale) / np.maximum(np.abs(values), FLATTEST)
-        step = -(vectors @ downhill) / scale
-        step *= min(1.0, FARTHEST / max(float(np.max(np.abs(step))), 1e-300))
-        if -0.5 * float(gradient @ step) < GAIN:
-            break
-        there = cost(x + step)
-        while there >= here and float(np.max(np.abs(step))) > NARROWEST:
-            step *= 0.5
-            there = cost(x + step)
-        if there >= here:
-            break
-        x, here = np.clip(x + step, -WIDEST, WIDEST), there
-    return x, widths, curvature
+    strengths = [f"effects.{label}.{side}" for label in scene.labels for side in scene.strengths(label)]
+    return Problem(scene, parameters(scene, paths, strengths), recordings, told).solve()
 
 
-def _slopes(
-    cost: Callable[[np.ndarray], float], x: np.ndarray, here: float, widths: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Gradient (k,) and curvature (k, k) of the cost at x by central differences."""
-    steps = np.diag(widths)
-    ends = [(cost(x + step), cost(x - step)) for step in steps]
-    gradient = np.array([ahead - behind for ahead, behind in ends]) / (2.0 * widths)
-    curvature = np.diag([ahead + behind - 2.0 * here for ahead, behind in ends] / widths**2)
-    for i in range(len(x)):
-        for j in range(i):
-            both = steps[i] + steps[j]
-            mixed = cost(x + both) + cost(x - both) + 2.0 * here - sum(ends[i]) - sum(ends[j])
-            curvature[i, j] = curvature[j, i] = 0.5 * mixed / (widths[i] * widths[j])
-    return gradient, curvature
-
-
-def _deviations(curvature: np.ndarray) -> np.ndarray:
-    """(k,) standard deviations that a curvature (k, k) means; infinite where it is not that of a minimum."""
-    if not np.isfinite(curvature).all() or np.min(np.linalg.eigvalsh(curvature)) <= 0.0:
-        return np.full(len(curvature), math.inf)
-    return np.asarray(np.sqrt(np.diag(np.linalg.inv(curvature))))
+def _covariance(curvature: np.ndarray) -> np.ndarray:
+    """(k, k) covariance that a curvature means; infinite variances where it is not that of a minimum."""
+    if not np.isfinite(curvature).all() or np.min(np.linalg.eigvalsh(curvature), initial=1.0) <= 0.0:
+        return np.diag(np.full(len(curvature), math.inf))
+    return np.asarray(np.linalg.inv(curvature))

@@ -45,59 +45,87 @@ class SceneText:
         """Its effects, as they stand in the file."""
         return list(self.data.get("effects") or [])
 
-    def without(self, index: int) -> "SceneText":
-        """The scene without the index-th effect; readouts, which may speak of it, are left out."""
-        effects = [entry for place, entry in enumerate(self.entries) if place != index]
-        data = {key: value for key, value in self.data.items() if key != "readouts"}
-        return SceneText(self.path, data | {"effects": effects})
+    @property
+    def labels(self) -> list[str]:
+        """Names of its effects' outputs, in their order."""
+        return [label_of(entry) for entry in self.entries]
+
+    def without(self, label: str, side: str = "") -> "SceneText":
+        """The scene without an effect, and without readouts of its force; or without one side of it.
+
+        A side is one of the effect's strengths; what is told about it besides, such as how uncertain it is, goes with it.
+        """
+        place = self.labels.index(label)
+        effects = copy.deepcopy(self.entries)
+        if side:
+            (inner,) = effects[place].values()
+            *outer, last = self._keys(f"effects.{label}.{side}")[3:]
+            for key in outer:
+                inner = inner[key]
+            for key in [key for key in inner if f"{key}_".startswith(f"{last}_")]:
+                del inner[key]
+            return SceneText(self.path, dict(self.data) | {"effects": effects})
+        del effects[place]
+        readouts = [each for each in self.data.get("readouts") or [] if not _is_force_of(each, label)]
+        return SceneText(self.path, dict(self.data) | {"effects": effects, "readouts": readouts})
 
     def added(self, entry: Any) -> "SceneText":
         """The scene with one effect more, at the end."""
         return SceneText(self.path, dict(self.data) | {"effects": [*self.entries, entry]})
 
-    def number(self, path: str) -> float:
-        """The number at a path, in the unit that it has there.
+    def strengths(self, label: str) -> list[str]:
+        """The sides of an effect that are there: where in it numbers other than zero stand that say how strong it is."""
+        place = self.labels.index(label)
+        fields = _fields(self.entries[place])
+        return [
+            ".".join([field, *keys])
+            for field in self.build().effects[place].strengths
+            for keys in _numbers(fields.get(field))
+        ]
 
-        Raises:
-            SceneError: the path leads nowhere, or to no number other than zero, which cannot be scaled.
-        """
+    def value(self, path: str) -> Any:
+        """What stands at a path; SceneError if it leads nowhere."""
+        value: Any = self.data
+        for key in self._keys(path):
+            value = value[key]
+        return value
+
+    def proper(self, path: str) -> str:
+        """A path that calls the effect it leads into, if any, by its name; SceneError if it leads nowhere."""
         keys = self._keys(path)
-        return _number(self._at(keys), f"{self.path}: {path}")
+        if keys[:1] == ["effects"] and len(keys) > 1:
+            return ".".join(["effects", self.labels[int(keys[1])], *map(str, keys[3:])])
+        return ".".join(map(str, keys))
 
-    def scaled(self, factors: Mapping[str, float]) -> "SceneText":
-        """The scene with the numbers at some paths multiplied."""
+    def number(self, path: str) -> float:
+        """The number at a path, in the unit that it has there; SceneError if there is none."""
+        value = self.value(path)
+        split = _split(value)
+        if split is None:
+            raise SceneError(f"{self.path}: {path}: {shown(value)} is no number and cannot be fitted")
+        return split[0]
+
+    def changed(self, numbers: Mapping[str, float]) -> "SceneText":
+        """The scene with other numbers at some paths, in the units of those that stand there."""
         data = copy.deepcopy(dict(self.data))
-        for path, factor in factors.items():
+        for path, number in numbers.items():
             keys = self._keys(path)
             inner: Any = data
             for key in keys[:-1]:
                 inner = inner[key]
-            inner[keys[-1]] = _scaled(inner[keys[-1]], factor)
+            unit = _unit(inner, keys[-1])
+            inner[keys[-1]] = f"{number!r}{unit}" if unit else number
         return SceneText(self.path, data)
 
     def noisier(self, factor: float) -> "SceneText":
         """The scene with all measurements, and the forces that it does not know, so many times as uncertain."""
-        paths = ["noise.force"] if _split((self.data.get("noise") or {}).get("force")) is not None else []
+        force = (self.data.get("noise") or {}).get("force")
+        paths = [".".join(["noise", "force", *keys]) for keys in _numbers(force)]
         for place, entry in enumerate(self.data.get("measurements") or []):
             for kind, fields in entry.items():
                 noises = [key for key in fields if key.endswith("noise")]
                 paths += [f"measurements.{place}.{kind}.{key}" for key in noises]
-        return self.scaled(dict.fromkeys(paths, factor)) if factor != 1.0 else self
-
-    def paths(self, index: int) -> list[str]:
-        """Paths of the numbers other than zero of the index-th effect."""
-        entry = self.entries[index]
-        return [".".join(map(str, ("effects", index, *keys))) for keys in _numbers(entry)]
-
-    def belongs(self, path: str, index: int) -> bool:
-        """Whether a path leads into the index-th effect."""
-        return self._keys(path)[:2] == ["effects", index]
-
-    def _at(self, keys: list[Key]) -> Any:
-        value: Any = self.data
-        for key in keys:
-            value = value[key]
-        return value
+        return self.changed({path: factor * self.number(path) for path in paths}) if factor != 1.0 else self
 
     def _keys(self, path: str) -> list[Key]:
         """Keys and indices of a path such as ``model.parts.rod.mass`` or ``effects.joint_damping.coefficients.pin``.
@@ -106,21 +134,22 @@ class SceneText:
         """
         keys: list[Key] = []
         value: Any = self.data
-        for word in path.split("."):
+        rest = path
+        while rest:
+            known: dict[str, Key] = {}
             if isinstance(value, list):
                 known = {str(place): place for place in range(len(value))}
                 if keys == ["effects"]:
                     known |= {label_of(entry): place for place, entry in enumerate(value)}
-                found: Key | None = known.get(word)
-            else:
-                known = {key: key for key in value} if isinstance(value, dict) else {}
-                found = known.get(word)
-            if found is None:
+            elif isinstance(value, dict):
+                known = {str(key): key for key in value}
+            word = max((word for word in known if f"{rest}.".startswith(f"{word}.")), key=len, default=None)
+            if word is None:  # the longest known word is taken: names may have dots in them
                 raise SceneError(
-                    f"{self.path}: parameter '{path}' is not there: at {word!r:.80}, known are {list(known)}"
+                    f"{self.path}: parameter '{path}' is not there: at {rest.partition('.')[0]!r:.80}, known are {list(known)}"
                 )
-            keys.append(found)
-            value = value[found]
+            keys.append(known[word])
+            value, rest = value[known[word]], rest[len(word) + 1 :]
             if keys[:1] == ["effects"] and len(keys) == 2 and isinstance(value, dict):  # {kind: fields}: step inside
                 (kind,) = list(value)[:1] or [""]
                 keys.append(kind)
@@ -141,21 +170,26 @@ def kind_of(entry: Any) -> str:
     return str(next(iter(entry), "")) if isinstance(entry, dict) else str(entry)
 
 
-def _numbers(entry: Any) -> Iterator[tuple[Key, ...]]:
-    """Where numbers other than zero stand in the fields of an effect."""
+def _fields(entry: Any) -> dict[str, Any]:
+    """The fields of an effect's entry."""
     fields = next(iter(entry.values()), None) if isinstance(entry, dict) else None
+    return fields if isinstance(fields, dict) else {}
 
-    def walk(value: Any, keys: tuple[Key, ...]) -> Iterator[tuple[Key, ...]]:
-        if isinstance(value, dict):
-            for key, inner in value.items():
-                yield from walk(inner, (*keys, key))
-        elif isinstance(value, list):
-            for place, inner in enumerate(value):
-                yield from walk(inner, (*keys, place))
-        elif _split(value) is not None and _split(value) != (0.0, ""):
-            yield keys
 
-    yield from walk(fields, ())
+def _numbers(value: Any) -> Iterator[list[str]]:
+    """Where numbers other than zero stand in a number or in one for each joint: the keys that lead there."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from ([str(key), *keys] for keys in _numbers(inner))
+    elif (_split(value) or (0.0, ""))[0] != 0.0:
+        yield []
+
+
+def _is_force_of(readout: Any, label: str) -> bool:
+    """Whether a readout, as it stands in the file, is of the force of an effect."""
+    force = readout.get("force") if isinstance(readout, dict) else None
+    named = force.get("constraint") if isinstance(force, dict) else force
+    return isinstance(named, str) and f"{named}.".startswith(f"{label}.")
 
 
 def _split(value: Any) -> tuple[float, str] | None:
@@ -166,15 +200,9 @@ def _split(value: Any) -> tuple[float, str] | None:
     return None if match is None else (float(match[1]), match[2] or "")
 
 
-def _number(value: Any, where: str) -> float:
-    split = _split(value)
-    if split is None or split[0] == 0.0:
-        raise SceneError(f"{where}: {shown(value)} cannot be fitted: that takes a number other than zero")
-    return split[0]
-
-
-def _scaled(value: Any, factor: float) -> Any:
-    split = _split(value)
-    assert split is not None
-    number, unit = split
-    return f"{number * factor!r}{unit}" if unit else number * factor
+def _unit(inner: Any, key: Key) -> str:
+    """The unit of a number in what holds it; a bare zero in a list has that of those beside it."""
+    number, unit = _split(inner[key]) or (0.0, "")
+    if isinstance(inner, list) and not unit and number == 0.0:
+        return next((split[1] for split in map(_split, inner) if split is not None and split[1]), "")
+    return unit

@@ -28,3 +28,14 @@ def damped_measurements(damped_rod):
 @pytest.fixture(scope="session")
 def free_measurements(free_rod):
     return simulated_measurements(free_rod.build(), seed=2, duration=2.0)
+
+
+@pytest.fixture(scope="session")
+def sliding_cube():
+    """The cube of the shipped scene, pushed along the table."""
+    text = SceneText.read("cube_toss")
+    start = {
+        "positions": {"cube": {"position": [0, 0, "52.4 mm"]}},
+        "velocities": {"cube": {"linear": ["1 m/s", 0, 0], "angular": [0, 0, 0]}},
+    }
+    return SceneText(text.path, dict(text.data) | {"initial": start})

@@ -2,11 +2,11 @@
 
 Unit forces of all rows run once through the articulated-body factors: Y = their generalized forces, Z = D^-1 Y, so that
 A M^-1 A^T = Y Z^T without A or M ever being formed. Redundant rows leave it singular; the solve is proximal (Carpentier
-2021): regularised by 1e-10 of the mean diagonal and refined, so that motion is exact and multipliers are those of least
-norm. ``rows`` is one array (m + 3, 2 w + 2 m): Y | Z | A M^-1 A^T | its Cholesky factor, and below them right side, answer
-and change; w counts the degrees of freedom that the rows move. The directions of a pair that is not active are zero, and with
-them all its rows. A row d . (b - a), d fixed on link a, sees b move against link
-a's own point at b: so both forces act at b. The two of a rod act at its ends.
+2021): regularised by 1e-10 of each row's own scale (``weigh_rows``) and refined, so that motion is exact and multipliers
+are those of least norm, rows between other links weighted by their scales. ``rows`` is one array (m + 3, 2 w + 2 m): Y | Z |
+A M^-1 A^T | its Cholesky factor, and below them right side, answer and change; w counts the degrees of freedom that the
+rows move. The directions of a pair that is not active are zero, and with them all its rows. A row d . (b - a), d fixed on
+link a, sees b move against link a's own point at b: so both forces act at b. The two of a rod act at its ends.
 """
 
 import math
@@ -31,7 +31,7 @@ from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import pose, weigh
 from physics_prior.dynamics.types import Array, Record, Records, Vector
 
-REGULARISATION = 1e-10  # of the mean diagonal: small steps are not safer near a singular configuration (design eq. 11)
+REGULARISATION = 1e-10  # of a row's scale: small steps are not safer near a singular configuration (design eq. 11)
 DEPENDENT = 1e3  # a pivot within this factor of the regularisation belongs to a row that adds nothing
 REFINEMENTS = 3
 EXACT = 1e-15  # of the right side: refinement stops there
@@ -192,33 +192,32 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: 
             push(links, work, pair.link_b, get3(pair.b), d, pair.rows, y, z)
             push(links, work, pair.link_a, get3(pair.hold), minus9(d), pair.rows, y, z)
             active += pair.rows
-    trace = 0.0
+    S, L = rows[:, 2 * w : 2 * w + m], rows[:, 2 * w + m : 2 * w + 2 * m]
+    scales = rows[m + 2]
     for r in range(m):
         one = rows[r, :w]
-        drop_rounding(rows[r, : 2 * w], w)
+        scales[r] = drop_rounding(rows[r, : 2 * w], w)
         for s in range(r + 1):
             other, total = rows[s, w : 2 * w], 0.0
             for k in range(w):
                 total += one[k] * other[k]
-            rows[r, 2 * w + s] = total
-            rows[s, 2 * w + r] = total
-        trace += rows[r, 2 * w + r]
-    epsilon = REGULARISATION * trace / active if trace > 0.0 else 1.0
+            S[r, s] = total
+            S[s, r] = total
+    weigh_rows(pairs, S, scales, active)
     rank, least = 0, math.inf
-    S, L = rows[:, 2 * w : 2 * w + m], rows[:, 2 * w + m : 2 * w + 2 * m]
     for r in range(m):
         for s in range(r, m):
             L[r, s] = S[r, s]
-        L[r, r] += epsilon
+        L[r, r] += REGULARISATION * scales[r]
     for p in range(pairs.shape[0]):
         pair = pairs[p]
         for r in range(pair.first, pair.first + pair.rows):
-            pivot = L[r, r]
+            epsilon, pivot = REGULARISATION * scales[r], L[r, r]
             if pivot > DEPENDENT * epsilon:
                 rank += 1
             pivot = max(pivot, 1e-3 * epsilon)
             if pair.active:
-                least = min(least, pivot)
+                least = min(least, pivot / scales[r])
             inverse = 1.0 / pivot
             L[r, r] = inverse
             for s in range(r + 1, m):
@@ -229,7 +228,32 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: 
             for s in range(r + 1, m):
                 L[r, s] = L[s, r]
     known[-2] = rank
-    known[-1] = max(POSITION_TOLERANCE * math.sqrt(least * REGULARISATION / epsilon), ROUNDING)
+    known[-1] = max(POSITION_TOLERANCE * math.sqrt(least), ROUNDING)
+
+
+@kernel
+def weigh_rows(pairs: Records, S: Array, scales: Array, active: int) -> None:
+    """Replace the rows' squared levers, m^2, in scales by what the diagonal of S = A M^-1 A^T would be of usual levers.
+
+    That is the mean squared lever of the active rows, over the inertia that the rows between two links meet. So a row is
+    weak by its lever (a fold), not because a link elsewhere is light. Of rows between the same links it is one number, so
+    that redundant ones share by least multipliers.
+    """
+    levers, first = 0.0, 0
+    for r in range(S.shape[0]):
+        levers += scales[r]
+    for p in range(pairs.shape[0]):
+        pair, last = pairs[p], pairs[p].first + pairs[p].rows
+        if p + 1 < pairs.shape[0] and pairs[p + 1].link_a == pair.link_a and pairs[p + 1].link_b == pair.link_b:
+            continue
+        mobility, own = 0.0, 0.0
+        for r in range(first, last):
+            mobility += S[r, r]
+            own += scales[r]
+        scale = mobility / own * levers / active if own > 0.0 else 1.0
+        for r in range(first, last):
+            scales[r] = scale
+        first = last
 
 
 @kernel

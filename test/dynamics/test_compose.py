@@ -153,7 +153,9 @@ def test_cache_is_keyed_by_the_kernels_sources(monkeypatch, tmp_path):
         cache_directory.cache_clear()
 
 
-def test_garbage_collector_rests_while_kernels_compile_and_works_again_after_failures():
+def test_garbage_collector_rests_while_kernels_compile_and_works_again_after_failures(monkeypatch, tmp_path):
+    """In an empty cache: what an earlier run left in the usual one would be loaded and not compiled."""
+    monkeypatch.setattr("physics_prior.dynamics.kernel.cache_directory", lambda: tmp_path)
     seen = []
 
     class Look(event.Listener):

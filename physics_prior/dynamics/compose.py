@@ -16,12 +16,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
+import numba
 import numpy as np
+from numba.core.errors import NumbaError
 
+from physics_prior.dynamics.derivatives import COMPOSITE, FREEDOM
 from physics_prior.dynamics.integrators import INTEGRATORS, IntegratorName
 from physics_prior.dynamics.kernel import cache_directory, inline_kernel, sources_digest
+from physics_prior.dynamics.records import LINK, WORK
 from physics_prior.dynamics.types import Array
 from physics_prior.effects.effect import Effect
+from physics_prior.errors import ModelError
 from physics_prior.model import Tree
 
 ROOM = "physics_prior.dynamics"
@@ -32,6 +37,10 @@ FUNCTIONS = {
     "energy": ("potential_energy", "links, work, q", "total += {}"),
 }
 """By function of a CompiledForce: the function of the step that calls it, the arguments of both, and the line of a call."""
+
+NUMBERS, MATRIX = numba.types.float64[::1], numba.types.float64[:, :]
+RECORDS = {"links": LINK, "work": WORK, "freedoms": FREEDOM, "composites": COMPOSITE}
+TYPES = {name: numba.from_dtype(dtype)[::1] for name, dtype in RECORDS.items()} | {"tau_q": MATRIX, "tau_v": MATRIX}
 
 
 def pack_parameters(tree: Tree, effects: Sequence[Effect]) -> np.ndarray:
@@ -103,11 +112,18 @@ def step_module(
     touching: bool = False,
     sleeping: bool = False,
 ) -> ModuleType:
-    """The step module of a scene, written to the kernel cache where it is not there yet, and imported."""
+    """The step module of a scene, written to the kernel cache where it is not there yet, and imported.
+
+    Raises:
+        ModelError: a kernel of a user's effect does not compile.
+    """
     text = step_source(effects, constrained, integrator, touching, sleeping)
     name = "step_" + hashlib.sha256(text.encode()).hexdigest()[:16]
     if name in sys.modules:
         return sys.modules[name]
+    for effect in effects:
+        if effect.compiled is not None and not type(effect).__module__.startswith("physics_prior."):
+            _compile_alone(effect)
     path = cache_directory() / f"{name}.py"
     if not path.exists():
         # written aside and moved in place, so that another process never reads half a file
@@ -122,6 +138,24 @@ def step_module(
     sys.modules[name] = module
     spec.loader.exec_module(module)
     return module
+
+
+def _compile_alone(effect: Effect) -> None:
+    """Compile a user's kernels by themselves: inside the step, Numba's complaint would be about the step."""
+    for each, (_, arguments, _) in FUNCTIONS.items():
+        function = getattr(effect.compiled, each)
+        if function is None:
+            continue
+        signature = tuple(TYPES.get(name, NUMBERS) for name in ("parameters", *arguments.split(", ")))
+        try:
+            function.compile(signature)
+        except NumbaError as problem:
+            lines = [line.strip() for line in str(problem).splitlines()]
+            cause = next(line for line in lines if line and not line.startswith("Failed in"))
+            code = function.py_func.__code__
+            raise ModelError(
+                f"effect '{effect.kind}': its '{each}' ({code.co_filename}:{code.co_firstlineno}) does not compile: {cause}"
+            ) from problem
 
 
 def _text(name: str) -> str:

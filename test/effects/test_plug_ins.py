@@ -12,7 +12,7 @@ import pytest
 
 import physics_prior
 from physics_prior.dynamics.compose import step_source
-from physics_prior.errors import SceneError
+from physics_prior.errors import ModelError, SceneError
 from physics_prior.estimation.process import PhysicsProcess
 from physics_prior.recording.simulate import motion
 from physics_prior.scene import load_scene
@@ -127,6 +127,22 @@ def test_broken_effects_are_one_sentence_at_the_line_of_the_scene(install, code,
     with pytest.raises(SceneError, match=rf"kite.yaml:\d+: effects\[\d\].*{message}") as caught:
         load_scene(install(code, offer))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "message"),
+    [
+        ("    push(work", "    pull(work", "its 'apply' .*does not compile: .*'pull'"),
+        ("dot(u, u), 1e-9", "dot(u, 3), 1e-9", "its 'differentiate' .*does not compile: "),
+    ],
+)
+def test_kernels_that_do_not_compile_are_one_sentence(install, right, wrong, message):
+    assert right in CODE
+    scene = load_scene(install(CODE.replace(right, wrong)))
+    with pytest.raises(ModelError, match=rf"effect 'kite_wind': {message}") as caught:
+        scene.simulator()
+    assert "\n" not in str(caught.value)
+    assert "wind.py:" in str(caught.value)
 
 
 def test_scenes_that_do_not_name_a_broken_effect_do_not_notice(install):

@@ -60,16 +60,16 @@ def subtract_transposed_product(a: Array, b: Array, out: Array) -> None:
 
 
 @kernel
-def drop_rounding(row: Array, width: int) -> float:
-    """Clear a row whose first numbers, the joints' levers, m, under a unit force, are rounding: a rod at its dead centre.
+def drop_rounding(levers: Array, shares: Array) -> float:
+    """Clear a row's levers, m, of joints under its unit force, and shares, where they are rounding: a rod at its dead centre.
 
     Return the sum of the squares of its levers.
     """
     total = 0.0
-    for k in range(width):
-        total += row[k] * row[k]
+    for k in range(levers.shape[0]):
+        total += levers[k] * levers[k]
     if total < NOTHING:
-        for k in range(row.shape[0]):
-            row[k] = 0.0
+        for k in range(levers.shape[0]):
+            levers[k], shares[k] = 0.0, 0.0
         total = 0.0
     return total

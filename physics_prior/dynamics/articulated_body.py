@@ -8,9 +8,14 @@ constraints, projections and derivatives run through the same factors.
 
 from physics_prior.dynamics.algebra import (
     ZERO,
+    add3,
     cross,
+    determinant,
     difference9,
     dot,
+    dot_on,
+    dots,
+    fma,
     full,
     get3,
     get6,
@@ -31,65 +36,56 @@ from physics_prior.dynamics.algebra import (
     transposed_times,
 )
 from physics_prior.dynamics.kernel import inline_kernel, kernel
-from physics_prior.dynamics.records import FREE, PRISMATIC, REVOLUTE
+from physics_prior.dynamics.records import ALL, FREE, PRISMATIC, REVOLUTE
 from physics_prior.dynamics.types import Array, Matrix, Record, Records, Symmetric, Vector
+
+
+@inline_kernel
+def crossed_mass(arm: Vector, M: Symmetric) -> Matrix:
+    """The matrix [arm]x M."""
+    x, y, z = arm
+    return (
+        determinant(y, M[2], z, M[1]),
+        determinant(y, M[4], z, M[3]),
+        determinant(y, M[5], z, M[4]),
+        determinant(z, M[0], x, M[2]),
+        determinant(z, M[1], x, M[4]),
+        determinant(z, M[2], x, M[5]),
+        determinant(x, M[1], y, M[0]),
+        determinant(x, M[3], y, M[1]),
+        determinant(x, M[4], y, M[2]),
+    )
 
 
 @inline_kernel
 def shift_to_parent(up: Record, arm: Vector, J: Symmetric, H: Matrix, M: Symmetric) -> None:
     """Add an articulated inertia about a joint to the parent link's, whose origin is ``arm`` before it."""
     x, y, z = arm
-    m0, m1, m2, m3, m4, m5 = M
-    # S = [arm]x M
-    s0, s1, s2 = y * m2 - z * m1, y * m4 - z * m3, y * m5 - z * m4
-    s3, s4, s5 = z * m0 - x * m2, z * m1 - x * m4, z * m2 - x * m5
-    s6, s7, s8 = x * m1 - y * m0, x * m3 - y * m1, x * m4 - y * m2
-    # B = [arm]x H^T, so that the shifted J is J + B + B^T - S [arm]x
-    b0, b1, b2 = y * H[2] - z * H[1], y * H[5] - z * H[4], y * H[8] - z * H[7]
-    b3, b4, b5 = z * H[0] - x * H[2], z * H[3] - x * H[5], z * H[6] - x * H[8]
-    b6, b7, b8 = x * H[1] - y * H[0], x * H[4] - y * H[3], x * H[7] - y * H[6]
-    up.J[0] += J[0] + 2.0 * b0 - (s1 * z - s2 * y)
-    up.J[1] += J[1] + b1 + b3 - (s2 * x - s0 * z)
-    up.J[2] += J[2] + b2 + b6 - (s0 * y - s1 * x)
-    up.J[3] += J[3] + 2.0 * b4 - (s5 * x - s3 * z)
-    up.J[4] += J[4] + b5 + b7 - (s3 * y - s4 * x)
-    up.J[5] += J[5] + 2.0 * b8 - (s6 * y - s7 * x)
-    up.H[0] += H[0] + s0
-    up.H[1] += H[1] + s1
-    up.H[2] += H[2] + s2
-    up.H[3] += H[3] + s3
-    up.H[4] += H[4] + s4
-    up.H[5] += H[5] + s5
-    up.H[6] += H[6] + s6
-    up.H[7] += H[7] + s7
-    up.H[8] += H[8] + s8
-    for k in range(6):
-        up.M[k] += M[k]
+    # B = [arm]x H^T, so that the shifted J is J + B + B^T - [arm]x M [arm]x; the last falls to the mass
+    up.J[0] += fma(2.0, determinant(y, H[2], z, H[1]), J[0])
+    up.J[1] += J[1] + fma(y, H[5], fma(-z, H[4], determinant(z, H[0], x, H[2])))
+    up.J[2] += J[2] + fma(y, H[8], fma(-z, H[7], determinant(x, H[1], y, H[0])))
+    up.J[3] += fma(2.0, determinant(z, H[3], x, H[5]), J[3])
+    up.J[4] += J[4] + fma(z, H[6], fma(-x, H[8], determinant(x, H[4], y, H[3])))
+    up.J[5] += fma(2.0, determinant(x, H[7], y, H[6]), J[5])
+    for k in range(9):
+        up.H[k] += H[k]
+    shift_mass_to_parent(up, arm, M)
 
 
 @inline_kernel
 def shift_mass_to_parent(up: Record, arm: Vector, M: Symmetric) -> None:
     """Add an articulated mass at a joint, all that a ball joint passes on, to the parent link's inertia."""
     x, y, z = arm
-    m0, m1, m2, m3, m4, m5 = M
-    s0, s1, s2 = y * m2 - z * m1, y * m4 - z * m3, y * m5 - z * m4
-    s3, s4, s5 = z * m0 - x * m2, z * m1 - x * m4, z * m2 - x * m5
-    s6, s7, s8 = x * m1 - y * m0, x * m3 - y * m1, x * m4 - y * m2
-    up.J[0] -= s1 * z - s2 * y
-    up.J[1] -= s2 * x - s0 * z
-    up.J[2] -= s0 * y - s1 * x
-    up.J[3] -= s5 * x - s3 * z
-    up.J[4] -= s3 * y - s4 * x
-    up.J[5] -= s6 * y - s7 * x
-    up.H[0] += s0
-    up.H[1] += s1
-    up.H[2] += s2
-    up.H[3] += s3
-    up.H[4] += s4
-    up.H[5] += s5
-    up.H[6] += s6
-    up.H[7] += s7
-    up.H[8] += s8
+    s = crossed_mass(arm, M)
+    up.J[0] += fma(s[2], y, -(s[1] * z))
+    up.J[1] += fma(s[0], z, -(s[2] * x))
+    up.J[2] += fma(s[1], x, -(s[0] * y))
+    up.J[3] += fma(s[3], z, -(s[5] * x))
+    up.J[4] += fma(s[4], x, -(s[3] * y))
+    up.J[5] += fma(s[7], x, -(s[6] * y))
+    for k in range(9):
+        up.H[k] += s[k]
     for k in range(6):
         up.M[k] += M[k]
 
@@ -98,12 +94,25 @@ def shift_mass_to_parent(up: Record, arm: Vector, M: Symmetric) -> None:
 def _schur(M: Symmetric, H: Matrix, K: Matrix) -> Symmetric:
     """The symmetric matrix M - H^T K, K = J^-1 H: the mass felt through a ball joint."""
     return (
-        M[0] - (H[0] * K[0] + H[3] * K[3] + H[6] * K[6]),
-        M[1] - (H[0] * K[1] + H[3] * K[4] + H[6] * K[7]),
-        M[2] - (H[0] * K[2] + H[3] * K[5] + H[6] * K[8]),
-        M[3] - (H[1] * K[1] + H[4] * K[4] + H[7] * K[7]),
-        M[4] - (H[1] * K[2] + H[4] * K[5] + H[7] * K[8]),
-        M[5] - (H[2] * K[2] + H[5] * K[5] + H[8] * K[8]),
+        dot_on(M[0], -H[0], -H[3], -H[6], K[0], K[3], K[6]),
+        dot_on(M[1], -H[0], -H[3], -H[6], K[1], K[4], K[7]),
+        dot_on(M[2], -H[0], -H[3], -H[6], K[2], K[5], K[8]),
+        dot_on(M[3], -H[1], -H[4], -H[7], K[1], K[4], K[7]),
+        dot_on(M[4], -H[1], -H[4], -H[7], K[2], K[5], K[8]),
+        dot_on(M[5], -H[2], -H[5], -H[8], K[2], K[5], K[8]),
+    )
+
+
+@inline_kernel
+def _minus_symmetric(m: Symmetric, u: Vector, w: Vector) -> Symmetric:
+    """The symmetric matrix m - u w^T, u along w."""
+    return (
+        fma(-u[0], w[0], m[0]),
+        fma(-u[0], w[1], m[1]),
+        fma(-u[0], w[2], m[2]),
+        fma(-u[1], w[1], m[3]),
+        fma(-u[1], w[2], m[4]),
+        fma(-u[2], w[2], m[5]),
     )
 
 
@@ -111,15 +120,15 @@ def _schur(M: Symmetric, H: Matrix, K: Matrix) -> Symmetric:
 def _symmetric_product(a: Symmetric, h: Matrix) -> Matrix:
     """The product of a symmetric 6-tuple and a 9-tuple."""
     return (
-        a[0] * h[0] + a[1] * h[3] + a[2] * h[6],
-        a[0] * h[1] + a[1] * h[4] + a[2] * h[7],
-        a[0] * h[2] + a[1] * h[5] + a[2] * h[8],
-        a[1] * h[0] + a[3] * h[3] + a[4] * h[6],
-        a[1] * h[1] + a[3] * h[4] + a[4] * h[7],
-        a[1] * h[2] + a[3] * h[5] + a[4] * h[8],
-        a[2] * h[0] + a[4] * h[3] + a[5] * h[6],
-        a[2] * h[1] + a[4] * h[4] + a[5] * h[7],
-        a[2] * h[2] + a[4] * h[5] + a[5] * h[8],
+        dots(a[0], a[1], a[2], h[0], h[3], h[6]),
+        dots(a[0], a[1], a[2], h[1], h[4], h[7]),
+        dots(a[0], a[1], a[2], h[2], h[5], h[8]),
+        dots(a[1], a[3], a[4], h[0], h[3], h[6]),
+        dots(a[1], a[3], a[4], h[1], h[4], h[7]),
+        dots(a[1], a[3], a[4], h[2], h[5], h[8]),
+        dots(a[2], a[4], a[5], h[0], h[3], h[6]),
+        dots(a[2], a[4], a[5], h[1], h[4], h[7]),
+        dots(a[2], a[4], a[5], h[2], h[5], h[8]),
     )
 
 
@@ -167,33 +176,9 @@ def factorize(links: Records, work: Records) -> None:
             here.D = D
             if link.parent >= 0:
                 a, b = scale(D, n), scale(D, f)
-                J = (
-                    J[0] - a[0] * n[0],
-                    J[1] - a[0] * n[1],
-                    J[2] - a[0] * n[2],
-                    J[3] - a[1] * n[1],
-                    J[4] - a[1] * n[2],
-                    J[5] - a[2] * n[2],
-                )
-                M = (
-                    M[0] - b[0] * f[0],
-                    M[1] - b[0] * f[1],
-                    M[2] - b[0] * f[2],
-                    M[3] - b[1] * f[1],
-                    M[4] - b[1] * f[2],
-                    M[5] - b[2] * f[2],
-                )
-                H = (
-                    H[0] - a[0] * f[0],
-                    H[1] - a[0] * f[1],
-                    H[2] - a[0] * f[2],
-                    H[3] - a[1] * f[0],
-                    H[4] - a[1] * f[1],
-                    H[5] - a[1] * f[2],
-                    H[6] - a[2] * f[0],
-                    H[7] - a[2] * f[1],
-                    H[8] - a[2] * f[2],
-                )
+                J = _minus_symmetric(J, a, n)
+                M = _minus_symmetric(M, b, f)
+                H = minus_outer(H, a, f)
                 # the reduced inertia, which is what the parent feels and what the bias runs through
                 put6(here.J, J)
                 put9(here.H, H)
@@ -212,13 +197,20 @@ def factorize(links: Records, work: Records) -> None:
                 shift_mass_to_parent(work[link.parent], get3(here.arm), M)
 
 
-@kernel
+@inline_kernel
 def accelerate(links: Records, work: Records, tau: Array, gravity: Array, vdot: Array) -> None:
     """Fill vdot (nv,) from generalized forces tau (nv,), external wrenches, velocities and gravity (3,).
 
     Needs ``move`` and ``factorize``. Spherical entries of tau and vdot are in the link's axes, the linear ones of a free
     joint in the world's. Leaves alpha and acceleration (less gravity) of every link in the workspace.
     """
+    gather(links, work, tau)
+    release(links, work, gravity, ALL, vdot)
+
+
+@kernel
+def gather(links: Records, work: Records, tau: Array) -> None:
+    """Run all forces inward through the factors: what is left at each joint to accelerate it."""
     for i in range(links.shape[0]):
         here = work[i]
         omega, center = get3(here.omega), get3(here.center)
@@ -256,8 +248,15 @@ def accelerate(links: Records, work: Records, tau: Array, gravity: Array, vdot: 
             moment = plus(moment, cross(get3(here.arm), force))
             put3(up.bias_moment, plus(get3(up.bias_moment), moment))
             put3(up.bias_force, plus(get3(up.bias_force), force))
+
+
+@kernel
+def release(links: Records, work: Records, gravity: Array, end: int, vdot: Array) -> None:
+    """Run what ``gather`` left at the joints outward: accelerations of the links whose column is before end."""
     for i in range(links.shape[0]):
         link, here = links[i], work[i]
+        if link.column >= end:
+            continue
         alpha, acceleration = ZERO, (-gravity[0], -gravity[1], -gravity[2])
         if link.parent >= 0:
             up = work[link.parent]
@@ -355,10 +354,32 @@ def push_wrenches(
 
 
 @kernel
-def pull(links: Records, work: Records, z: Array, vdot: Array) -> None:
-    """Run z (nv,) outward through the factors: fill vdot (nv,) = M^-1 tau, and the links' increments of acceleration."""
+def load_joints(links: Records, work: Records, end: int, forces: Array) -> None:
+    """Add generalized forces (w,), run through the factors as ``push`` does, to what ``gather`` left at the joints."""
     for i in range(links.shape[0]):
         link, here = links[i], work[i]
+        k = link.column
+        if k >= end:
+            continue
+        if link.kind == REVOLUTE or link.kind == PRISMATIC:
+            here.u[0] += forces[k]
+        else:
+            if link.kind == FREE:
+                add3(here.bias_force, get3(forces[k : k + 3]))
+                k += 3
+            add3(here.u, get3(forces[k : k + 3]))
+
+
+@kernel
+def pull(links: Records, work: Records, z: Array, end: int, vdot: Array) -> None:
+    """Run z (nv,) outward through the factors: fill vdot (nv,) = M^-1 tau, and the links' increments of acceleration.
+
+    Those of the links whose column is before end.
+    """
+    for i in range(links.shape[0]):
+        link, here = links[i], work[i]
+        if link.column >= end:
+            continue
         alpha, acceleration = ZERO, ZERO
         if link.parent >= 0:
             up = work[link.parent]

@@ -3,10 +3,12 @@
 Unit forces of all rows run once through the articulated-body factors: Y = their generalized forces, Z = D^-1 Y, so that
 A M^-1 A^T = Y Z^T without A or M ever being formed. Redundant rows leave it singular; the solve is proximal (Carpentier
 2021): regularised by 1e-10 of each row's own scale (``weigh_rows``) and refined, so that motion is exact and multipliers
-are those of least norm, rows between other links weighted by their scales. ``rows`` is one array (m + 3, 2 w + 2 m): Y | Z |
-A M^-1 A^T | its Cholesky factor, and below them right side, answer and change; w counts the degrees of freedom that the
-rows move. The directions of a pair that is not active are zero, and with them all its rows. A row d . (b - a), d fixed on
-link a, sees b move against link a's own point at b: so both forces act at b. The two of a rod act at its ends.
+are those of least norm, rows between other links weighted by their scales. ``rows`` is one array (m + 3, 2 w + 2 m + BOUNDS):
+Y | Z | A M^-1 A^T | its factor | bounds, and below them right side, answer and change; w counts the degrees of freedom that the
+rows move. Of A M^-1 A^T and its factor only the entries above the diagonal and on it are kept, up to the row's bound: loops in
+a row couple neighbours only, and cost in proportion to their number. The directions of a pair that is not active are zero, and
+with them all its rows. A row d . (b - a), d fixed on link a, sees b move against link a's own point at b: so both forces act at
+b. The two of a rod act at its ends.
 """
 
 import math
@@ -16,6 +18,7 @@ from physics_prior.dynamics.algebra import (
     add3,
     cross,
     dot,
+    fma,
     get3,
     get9,
     minus,
@@ -26,10 +29,11 @@ from physics_prior.dynamics.algebra import (
     times,
 )
 from physics_prior.dynamics.arrays import accumulate, clear, copy, drop_rounding
-from physics_prior.dynamics.articulated_body import factorize, pull, push
+from physics_prior.dynamics.articulated_body import factorize, gather, load_joints, pull, push, release
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import pose, weigh
-from physics_prior.dynamics.types import Array, Record, Records, Vector
+from physics_prior.dynamics.records import ALL, BOUNDS
+from physics_prior.dynamics.types import Array, Matrix, Record, Records, Vector
 
 REGULARISATION = 1e-10  # of a row's scale: small steps are not safer near a singular configuration (design eq. 11)
 DEPENDENT = 1e3  # a pivot within this factor of the regularisation belongs to a row that adds nothing
@@ -171,47 +175,79 @@ def row_count(rows: Array) -> int:
 @inline_kernel
 def width(rows: Array) -> int:
     """The number of degrees of freedom that the rows move."""
-    return int(rows.shape[1] // 2 - row_count(rows))
+    return int((rows.shape[1] - BOUNDS) // 2 - row_count(rows))
+
+
+@inline_kernel
+def bounds(rows: Array, r: int) -> tuple[int, int, int]:
+    """Where a row's columns begin and end, and the row behind the last one it is coupled to."""
+    last = rows.shape[1] - BOUNDS
+    return int(rows[r, last]), int(rows[r, last + 1]), int(rows[r, last + 2])
+
+
+@inline_kernel
+def _overlap(rows: Array, a: int, m: int, b: int, n: int, w: int, begin: int, end: int) -> Matrix:
+    """The products of m rows of Y from row a on and n rows of Z from row b on, over some columns; 1 <= m, n <= 3.
+
+    Nine sums side by side, which do not wait for one another. Beyond m and n they mean nothing.
+    """
+    y0, y1, y2 = rows[a], rows[a + min(m - 1, 1)], rows[a + m - 1]
+    z0, z1, z2 = rows[b, w:], rows[b + min(n - 1, 1), w:], rows[b + n - 1, w:]
+    s0, s1, s2, s3, s4, s5, s6, s7, s8 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(begin, end):
+        p, q, r, x, y, z = y0[k], y1[k], y2[k], z0[k], z1[k], z2[k]
+        s0, s1, s2 = fma(p, x, s0), fma(p, y, s1), fma(p, z, s2)
+        s3, s4, s5 = fma(q, x, s3), fma(q, y, s4), fma(q, z, s5)
+        s6, s7, s8 = fma(r, x, s6), fma(r, y, s7), fma(r, z, s8)
+    return s0, s1, s2, s3, s4, s5, s6, s7, s8
 
 
 @kernel
 def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: Array) -> None:
     """Fill Y, Z, A M^-1 A^T and its regularised Cholesky factor, and the last two of known. Needs factors and ``place``.
 
-    These are the rows' rank and the position error, m, that projection may leave. The factor: L D L^T, L both ways, D inverted.
+    These are the rows' rank and the position error, m, that projection may leave. The factor: L D L^T, D inverted.
     """
     m, w, active = row_count(rows), width(rows), 0
+    scales = rows[m + 2]
     for p in range(pairs.shape[0]):
         pair = pairs[p]
         first, last = pair.first, pair.first + pair.rows
+        begin, end, _ = bounds(rows, first)
         for r in range(first, last):
-            for k in range(2 * w):
+            for k in range(begin, end):
                 rows[r, k] = 0.0
+                rows[r, w + k] = 0.0
         if pair.active:
             y, z, d = rows[first:last, :w], rows[first:last, w : 2 * w], get9(pair.d)
             push(links, work, pair.link_b, get3(pair.b), d, pair.rows, y, z)
             push(links, work, pair.link_a, get3(pair.hold), minus9(d), pair.rows, y, z)
             active += pair.rows
+        for r in range(first, last):
+            scales[r] = drop_rounding(rows[r, begin:end], rows[r, w + begin : w + end])
     S, L = rows[:, 2 * w : 2 * w + m], rows[:, 2 * w + m : 2 * w + 2 * m]
-    scales = rows[m + 2]
-    for r in range(m):
-        one = rows[r, :w]
-        scales[r] = drop_rounding(rows[r, : 2 * w], w)
-        for s in range(r + 1):
-            other, total = rows[s, w : 2 * w], 0.0
-            for k in range(w):
-                total += one[k] * other[k]
-            S[r, s] = total
-            S[s, r] = total
+    for p in range(pairs.shape[0]):
+        first, count = pairs[p].first, pairs[p].rows
+        begin, end, reach = bounds(rows, first)
+        for o in range(p, pairs.shape[0]):
+            other, number = pairs[o].first, pairs[o].rows
+            if other >= reach:
+                break
+            from_, to, _ = bounds(rows, other)
+            block = _overlap(rows, first, count, other, number, w, max(begin, from_), min(end, to))
+            for r in range(count):
+                for s in range(number):
+                    if first + r <= other + s:
+                        S[first + r, other + s] = block[3 * r + s]
+                        L[first + r, other + s] = block[3 * r + s]
     weigh_rows(pairs, S, scales, active)
     rank, least = 0, math.inf
     for r in range(m):
-        for s in range(r, m):
-            L[r, s] = S[r, s]
         L[r, r] += REGULARISATION * scales[r]
     for p in range(pairs.shape[0]):
         pair = pairs[p]
         for r in range(pair.first, pair.first + pair.rows):
+            _, _, reach = bounds(rows, r)
             epsilon, pivot = REGULARISATION * scales[r], L[r, r]
             if pivot > DEPENDENT * epsilon:
                 rank += 1
@@ -220,13 +256,12 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: 
                 least = min(least, pivot / scales[r])
             inverse = 1.0 / pivot
             L[r, r] = inverse
-            for s in range(r + 1, m):
+            for s in range(r + 1, reach):
                 factor = L[r, s] * inverse
-                for k in range(s, m):
-                    L[s, k] -= factor * L[r, k]
-                L[s, r] = factor
-            for s in range(r + 1, m):
-                L[r, s] = L[s, r]
+                for k in range(s, reach):
+                    L[s, k] = fma(-factor, L[r, k], L[s, k])
+            for s in range(r + 1, reach):
+                L[r, s] *= inverse
     known[-2] = rank
     known[-1] = max(POSITION_TOLERANCE * math.sqrt(least), ROUNDING)
 
@@ -257,7 +292,7 @@ def weigh_rows(pairs: Records, S: Array, scales: Array, active: int) -> None:
 
 
 @kernel
-def multiply(rows: Array) -> float:
+def multiply(rows: Array, refinements: int) -> float:
     """Solve A M^-1 A^T answer = right side, proximally; return how much of the right side is left, relative to it.
 
     Fills the answer, spoils the right side.
@@ -268,24 +303,30 @@ def multiply(rows: Array) -> float:
     for r in range(m):
         answer[r] = 0.0
         size = max(size, abs(left[r]))
-    for _ in range(REFINEMENTS):
+    for _ in range(refinements):
         for r in range(m):
             change[r] = left[r]
         for s in range(m):
-            known, column = change[s], rows[s, 2 * w + m :]
-            for r in range(s + 1, m):
-                change[r] -= column[r] * known
-        for s in range(m):
-            change[s] *= rows[s, 2 * w + m + s]
+            _, _, reach = bounds(rows, s)
+            known, L = change[s], rows[s, 2 * w + m :]
+            for r in range(s + 1, reach):
+                change[r] = fma(-known, L[r], change[r])
+            change[s] = known * L[s]
         for s in range(m - 1, -1, -1):
-            known, column = change[s], rows[s, 2 * w + m :]
+            _, _, reach = bounds(rows, s)
+            known, L = change[s], rows[s, 2 * w + m :]
+            for r in range(s + 1, reach):
+                known = fma(-L[r], change[r], known)
+            change[s] = known
             answer[s] += known
-            for r in range(s):
-                change[r] -= column[r] * known
         for s in range(m):
-            known, column = change[s], rows[s, 2 * w :]
-            for r in range(m):
-                left[r] -= column[r] * known
+            _, _, reach = bounds(rows, s)
+            known, S = change[s], rows[s, 2 * w :]
+            met = S[s] * known
+            for r in range(s + 1, reach):
+                left[r] = fma(-known, S[r], left[r])
+                met = fma(S[r], change[r], met)
+            left[s] -= met
         rest = 0.0
         for r in range(m):
             rest = max(rest, abs(left[r]))
@@ -295,25 +336,38 @@ def multiply(rows: Array) -> float:
 
 
 @kernel
-def respond(links: Records, work: Records, rows: Array, z: Array, vdot: Array) -> None:
-    """Fill vdot (nv,) = M^-1 A^T answer, and the links' increments of acceleration. z (nv,) is scratch."""
-    m, w = row_count(rows), width(rows)
-    clear(z)
-    for r in range(m):
-        known, own = rows[m + 1, r], rows[r, w : 2 * w]
-        for k in range(w):
-            z[k] += own[k] * known
-    pull(links, work, z, vdot)
+def gather_rows(pairs: Records, rows: Array, offset: int, out: Array) -> None:
+    """Add the columns of the rows, those of Y (offset 0) or of Z (offset w), times the answer to out, (w,) or longer."""
+    answer = rows[row_count(rows) + 1]
+    for p in range(pairs.shape[0]):
+        first, n = pairs[p].first, pairs[p].rows
+        begin, end, _ = bounds(rows, first)
+        a, b, c = rows[first, offset:], rows[first + min(n - 1, 1), offset:], rows[first + n - 1, offset:]
+        x, y, z = answer[first], 0.0, 0.0
+        if n > 1:
+            y = answer[first + 1]
+        if n > 2:
+            z = answer[first + 2]
+        for k in range(begin, end):
+            out[k] = fma(z, c[k], fma(y, b[k], fma(x, a[k], out[k])))
 
 
 @kernel
-def responses(links: Records, work: Records, rows: Array, z: Array, out: Array) -> None:
+def respond(links: Records, work: Records, pairs: Records, rows: Array, z: Array, vdot: Array) -> None:
+    """Fill vdot (nv,) = M^-1 A^T answer, and the links' increments of acceleration. z (nv,) is scratch."""
+    clear(z)
+    gather_rows(pairs, rows, width(rows), z)
+    pull(links, work, z, ALL, vdot)
+
+
+@kernel
+def responses(links: Records, work: Records, pairs: Records, rows: Array, z: Array, out: Array) -> None:
     """Fill out (m, nv) with M^-1 A^T, transposed; needs ``refresh``. z (nv,) is scratch."""
     m = row_count(rows)
     for r in range(m):
         for s in range(m):
             rows[m + 1, s] = 1.0 if r == s else 0.0
-        respond(links, work, rows, z, out[r])
+        respond(links, work, pairs, rows, z, out[r])
 
 
 @kernel
@@ -324,18 +378,22 @@ def multiply_columns(rows: Array, left: Array, answer: Array, change: Array) -> 
     for _ in range(REFINEMENTS):
         copy(left, change)
         for s in range(m):
-            for r in range(s + 1, m):
+            _, _, reach = bounds(rows, s)
+            for r in range(s + 1, reach):
                 _subtract(rows[s, 2 * w + m + r], change[s], change[r])
-        for s in range(m):
             for c in range(change.shape[1]):
                 change[s, c] *= rows[s, 2 * w + m + s]
         for s in range(m - 1, -1, -1):
-            for r in range(s):
-                _subtract(rows[s, 2 * w + m + r], change[s], change[r])
+            _, _, reach = bounds(rows, s)
+            for r in range(s + 1, reach):
+                _subtract(rows[s, 2 * w + m + r], change[r], change[s])
         accumulate(1.0, change, answer)
         for s in range(m):
-            for r in range(m):
+            _, _, reach = bounds(rows, s)
+            _subtract(rows[s, 2 * w + s], change[s], left[s])
+            for r in range(s + 1, reach):
                 _subtract(rows[s, 2 * w + r], change[s], left[r])
+                _subtract(rows[s, 2 * w + r], change[r], left[s])
 
 
 @inline_kernel
@@ -372,24 +430,31 @@ def complete(links: Records, work: Records, pairs: Records, rows: Array, known: 
 
 
 @kernel
-def constrain_acceleration(
-    links: Records, work: Records, pairs: Records, rows: Array, gravity: Array, vdot: Array, spare: Array
+def accelerate_constrained(
+    links: Records,
+    work: Records,
+    pairs: Records,
+    rows: Array,
+    tau: Array,
+    gravity: Array,
+    vdot: Array,
+    scratch: Array,
 ) -> float:
-    """Add constraint forces to free accelerations: vdot (nv,) and the links'; fill pair.force; return what ``multiply`` does.
+    """Do as ``accelerate`` under the constraints; fill pair.force; return what ``multiply`` does.
 
-    Needs ``refresh`` and ``accelerate``. The system is design eq. 4 with f_c = +A^T lambda, so that pair.force acts ON link
-    b. spare (2, nv) is scratch.
+    Needs ``refresh``. The system is design eq. 4 with f_c = +A^T lambda, so that pair.force acts ON link b. Of the free
+    motion only what the rows touch is found; then their forces join the others at the joints. scratch (nv,).
     """
-    nv, m = vdot.shape[0], row_count(rows)
-    acceleration_error(work, pairs, gravity, rows[m])
-    unmet = multiply(rows)
-    respond(links, work, rows, spare[0], spare[1])
-    for k in range(nv):
-        vdot[k] += spare[1, k]
-    for i in range(links.shape[0]):
-        here = work[i]
-        add3(here.alpha, get3(here.delta_alpha))
-        add3(here.acceleration, get3(here.delta_acceleration))
+    w = width(rows)
+    gather(links, work, tau)
+    release(links, work, gravity, w, vdot)
+    acceleration_error(work, pairs, gravity, rows[row_count(rows)])
+    unmet = multiply(rows, REFINEMENTS)
+    clear(scratch)
+    gather_rows(pairs, rows, 0, scratch)
+    load_joints(links, work, w, scratch)
+    release(links, work, gravity, ALL, vdot)
+    m = row_count(rows)
     for p in range(pairs.shape[0]):
         pair = pairs[p]
         force = ZERO

@@ -6,7 +6,26 @@ counts as a translation that carries a ball joint. Forward dynamics follow from 
 
 import numpy as np
 
-from physics_prior.dynamics.algebra import cross, get3, get6, minus, plus, scale, symmetric_times
+from physics_prior.dynamics.algebra import (
+    add3,
+    cross,
+    dot,
+    full,
+    get3,
+    get6,
+    get9,
+    minus,
+    minus_outer,
+    plus,
+    put3,
+    put6,
+    put9,
+    rows_crossed,
+    scale,
+    symmetric_times,
+    times,
+    transposed_times,
+)
 from physics_prior.dynamics.gyroscopic import middle_correction, turning_inertia
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import freedom, freedoms
@@ -14,15 +33,13 @@ from physics_prior.dynamics.records import FREE, SPHERICAL
 from physics_prior.dynamics.spatial import (
     add,
     at_point,
-    columns_times,
     cross_force,
     cross_motion,
     get_spatial,
     power,
     put_spatial,
-    rows_times,
 )
-from physics_prior.dynamics.types import Array, Records, Spatial, Symmetric, Vector
+from physics_prior.dynamics.types import Array, Matrix, Record, Records, Spatial, Symmetric, Vector
 
 FREEDOM = np.dtype(
     [
@@ -40,20 +57,51 @@ COMPOSITE = np.dtype(
     [
         ("V", "f8", 6),  # velocity of the link
         ("A", "f8", 6),  # acceleration less gravity
-        ("I", "f8", 36),  # inertia of the link and all it carries, by columns
-        ("B", "f8", 36),  # twice their body Coriolis matrix, by columns
+        ("mass", "f8"),  # of the link and all it carries, kg
+        ("first", "f8", 3),  # their mass times their centre, kg m
+        ("inertia", "f8", 6),  # xx, xy, xz, yy, yz, zz, kg m^2
+        ("momentum", "f8", 3),  # their linear momentum, kg m/s
+        ("B", "f8", 9),  # moment by angular velocity of twice their body Coriolis matrix
         ("f", "f8", 6),  # their inertial force
     ],
     align=True,
 )
-"""One link and what it carries, about the first link's origin."""
+"""One link and what it carries, about the first link's origin.
+
+Twice the body Coriolis matrix, u -> V x* I u + u x* I V - I (V x u), takes a turn to the moment B turn and the force
+2 turn x momentum, and a shift to nothing (Jacobi's identity).
+"""
 
 
 @inline_kernel
-def _rigid(inertia: Symmetric, mass: float, center: Vector, u: Spatial) -> Spatial:
-    """The momentum of motion u: (angular about the reference point, linear)."""
-    linear = scale(mass, at_point(u, center))
-    return plus(symmetric_times(inertia, u[0]), cross(center, linear)), linear
+def _momentum(own: Record, u: Spatial) -> Spatial:
+    """The momentum of all that a link carries, moving by u: (angular about the reference point, linear)."""
+    first = get3(own.first)
+    return (
+        plus(symmetric_times(get6(own.inertia), u[0]), cross(first, u[1])),
+        minus(scale(own.mass, u[1]), cross(first, u[0])),
+    )
+
+
+@inline_kernel
+def _coriolis(own: Record, u: Spatial) -> Spatial:
+    """Twice the body Coriolis matrix times u."""
+    return times(get9(own.B), u[0]), scale(2.0, cross(u[0], get3(own.momentum)))
+
+
+@inline_kernel
+def _transposed_coriolis(own: Record, u: Spatial) -> Vector:
+    """The transpose times u, of which only the moment is not zero."""
+    return plus(transposed_times(get9(own.B), u[0]), scale(2.0, cross(get3(own.momentum), u[1])))
+
+
+@inline_kernel
+def _turning_coriolis(inertia: Symmetric, omega: Vector) -> Matrix:
+    """Twice the body Coriolis matrix of a body that turns about its centre: A + A^T - [I omega]x, A = [omega]x I."""
+    a = rows_crossed(omega, full(inertia))  # A^T, row by row: I is symmetric
+    x, y, z = symmetric_times(inertia, omega)
+    xy, xz, yz = a[1] + a[3], a[2] + a[6], a[5] + a[7]
+    return 2.0 * a[0], xy + z, xz - y, xy - z, 2.0 * a[4], yz + x, xz + y, yz - x, 2.0 * a[8]
 
 
 @kernel
@@ -102,21 +150,33 @@ def sweep(
             put_spatial(record.psi_dot, psi_dot)
             put_spatial(record.psi_ddot, add(cross_motion(A_up, S), cross_motion(V_up, psi_dot)))
         inertia, mass, center = get6(here.inertia), link.mass, plus(d, get3(here.center))
-        momentum = _rigid(inertia, mass, center, V)
-        turning = turning_inertia(link, here)
-        middle = step > 0.0 and (link.kind == SPHERICAL or link.kind == FREE) and mass > 0.0
-        for k in range(6):
-            turn = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
-            shift = (1.0 if k == 3 else 0.0, 1.0 if k == 4 else 0.0, 1.0 if k == 5 else 0.0)
-            u = (turn, shift)
-            Iu = _rigid(inertia, mass, center, u)
-            Ivu = _rigid(inertia, mass, center, cross_motion(V, u))
-            put_spatial(own.I[6 * k : 6 * k + 6], Iu)
-            Bu = add(cross_force(V, Iu), cross_force(u, momentum))
-            Bu = (minus(Bu[0], Ivu[0]), minus(Bu[1], Ivu[1]))
-            if middle and k < 3:
-                Bu = (plus(Bu[0], middle_correction(turning, omega, step, turn)), Bu[1])
-            put_spatial(own.B[6 * k : 6 * k + 6], Bu)
+        linear = scale(mass, at_point(V, center))
+        x, y, z = center
+        own.mass = mass
+        put3(own.first, scale(mass, center))
+        put3(own.momentum, linear)
+        put6(
+            own.inertia,
+            (
+                inertia[0] + mass * (y * y + z * z),
+                inertia[1] - mass * x * y,
+                inertia[2] - mass * x * z,
+                inertia[3] + mass * (x * x + z * z),
+                inertia[4] - mass * y * z,
+                inertia[5] + mass * (x * x + y * y),
+            ),
+        )
+        # and the moment of the force 2 turn x momentum at the centre
+        B = minus_outer(_turning_coriolis(inertia, omega), scale(2.0, linear), center)
+        along = 2.0 * dot(center, linear)
+        put9(own.B, (B[0] + along, B[1], B[2], B[3], B[4] + along, B[5], B[6], B[7], B[8] + along))
+        if step > 0.0 and (link.kind == SPHERICAL or link.kind == FREE) and mass > 0.0:
+            turning = turning_inertia(link, here)
+            for k in range(3):
+                turn = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
+                more = middle_correction(turning, omega, step, turn)
+                for r in range(3):
+                    own.B[3 * r + k] += more[r]
         lever = get3(here.center)
         force = scale(
             mass,
@@ -127,11 +187,14 @@ def sweep(
     for i in range(links.shape[0] - 1, 0, -1):
         if links[i].parent >= 0:
             own, up = composites[i], composites[links[i].parent]
-            for k in range(36):
-                up.I[k] += own.I[k]
-                up.B[k] += own.B[k]
+            up.mass += own.mass
+            add3(up.first, get3(own.first))
+            add3(up.momentum, get3(own.momentum))
             for k in range(6):
+                up.inertia[k] += own.inertia[k]
                 up.f[k] += own.f[k]
+            for k in range(9):
+                up.B[k] += own.B[k]
 
 
 @kernel
@@ -150,9 +213,9 @@ def inverse_dynamics_derivatives(
             record = freedom_records[k]
             S, psi_dot = get_spatial(record.S), get_spatial(record.psi_dot)
             psi_ddot, rate = get_spatial(record.psi_ddot), get_spatial(record.rate)
-            row_B, momentum = rows_times(own.B, S), columns_times(own.I, S)
-            column_q = add(add(columns_times(own.B, psi_dot), columns_times(own.I, psi_ddot)), cross_force(S, f))
-            column_v = add(columns_times(own.B, S), columns_times(own.I, rate))
+            row_B, momentum = _transposed_coriolis(own, S), _momentum(own, S)
+            column_q = add(add(_coriolis(own, psi_dot), _momentum(own, psi_ddot)), cross_force(S, f))
+            column_v = add(_coriolis(own, S), _momentum(own, rate))
             j = i
             while j >= 0:
                 other = links[j]
@@ -162,10 +225,10 @@ def inverse_dynamics_derivatives(
                         continue  # filled with the roles exchanged
                     n = other.v + e
                     up = freedom_records[n]
-                    S_up, psi_up = get_spatial(up.S), get_spatial(up.psi_dot)
-                    tau_q[k, n] = power(psi_up, row_B) + power(get_spatial(up.psi_ddot), momentum)
+                    S_up = get_spatial(up.S)
+                    tau_q[k, n] = dot(get3(up.psi_dot), row_B) + power(get_spatial(up.psi_ddot), momentum)
                     M[k, n] = power(S_up, momentum)
-                    tau_v[k, n] = power(S_up, row_B) + power(get_spatial(up.rate), momentum)
+                    tau_v[k, n] = dot(S_up[0], row_B) + power(get_spatial(up.rate), momentum)
                     if j != i or (translation_carries_ball and c >= 3 and e < 3):
                         tau_q[n, k] = power(S_up, column_q)
                         tau_v[n, k] = power(S_up, column_v)

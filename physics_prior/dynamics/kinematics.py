@@ -24,7 +24,7 @@ from physics_prior.dynamics.algebra import (
 )
 from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.kernel import inline_kernel, kernel
-from physics_prior.dynamics.records import FREE, PRISMATIC, REVOLUTE, SPHERICAL
+from physics_prior.dynamics.records import ALL, FREE, PRISMATIC, REVOLUTE, SPHERICAL
 from physics_prior.dynamics.types import Array, Matrix, Record, Records, Spatial, Vector
 
 
@@ -40,12 +40,20 @@ def move(links: Records, work: Records, q: Array, v: Array) -> None:
     flow(links, work, v)
 
 
-@kernel
+@inline_kernel
 def pose(links: Records, work: Records, q: Array) -> None:
     """Fill where the links are."""
+    pose_part(links, work, q, 0, ALL)
+
+
+@kernel
+def pose_part(links: Records, work: Records, q: Array, begin: int, end: int) -> None:
+    """Fill where the links are whose column is in [begin, end): those that constraints move come first, then the others."""
     work[0].factored = 0
     for i in range(links.shape[0]):
         link, here = links[i], work[i]
+        if link.column < begin or link.column >= end:
+            continue
         kind, k = link.kind, link.q
         if kind == FREE:
             arm = (q[k], q[k + 1], q[k + 2])
@@ -84,11 +92,19 @@ def weigh(links: Records, work: Records) -> None:
         put6(here.inertia, rotated_inertia(R, get6(link.inertia)))
 
 
-@kernel
+@inline_kernel
 def flow(links: Records, work: Records, v: Array) -> None:
     """Fill velocities, what they add to accelerations, and gyroscopic torques; needs ``pose`` and ``weigh``."""
+    flow_part(links, work, v, ALL)
+
+
+@kernel
+def flow_part(links: Records, work: Records, v: Array, end: int) -> None:
+    """Do so for the links whose column is before end."""
     for i in range(links.shape[0]):
         link, here = links[i], work[i]
+        if link.column >= end:
+            continue
         kind, n = link.kind, link.v
         omega, velocity = ZERO, ZERO
         arm = get3(here.arm)

@@ -8,7 +8,7 @@ import math
 
 from physics_prior.dynamics.algebra import cross, dot, plus, scale
 from physics_prior.dynamics.kernel import inline_kernel, kernel
-from physics_prior.dynamics.records import FREE, SPHERICAL
+from physics_prior.dynamics.records import ALL, FREE, SPHERICAL
 from physics_prior.dynamics.rotation_vector import exponential, right_jacobian, rotation_back, second_coefficient
 from physics_prior.dynamics.types import Array, Records, Vector
 
@@ -38,11 +38,19 @@ def local_rate_by_theta(theta: Vector, omega: Vector, direction: Vector, exact: 
     return plus(plus(scale(0.5, turned), scale(c, twice)), change)
 
 
-@kernel
+@inline_kernel
 def displace(links: Records, q: Array, delta: Array, out: Array) -> None:
     """Fill out (nq,) = q [+] delta; q and out may be the same array. Quaternions leave with unit norm."""
+    displace_part(links, q, delta, 0, ALL, out)
+
+
+@kernel
+def displace_part(links: Records, q: Array, delta: Array, begin: int, end: int, out: Array) -> None:
+    """Do so for the links whose column is in [begin, end)."""
     for i in range(links.shape[0]):
         link = links[i]
+        if link.column < begin or link.column >= end:
+            continue
         k, n = link.q, link.v
         if link.kind == SPHERICAL or link.kind == FREE:
             if link.kind == FREE:

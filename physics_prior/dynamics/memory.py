@@ -14,7 +14,7 @@ from numba.extending import intrinsic
 from physics_prior.dynamics.constraint_derivatives import GAP
 from physics_prior.dynamics.derivatives import COMPOSITE, FREEDOM
 from physics_prior.dynamics.kernel import inline_kernel
-from physics_prior.dynamics.records import LINK, PAIR, WORK
+from physics_prior.dynamics.records import BOUNDS, LINK, PAIR, WORK, row_bounds
 from physics_prior.dynamics.types import Array
 
 HEAD = 12
@@ -33,7 +33,7 @@ class Memory:
     Attributes:
         array: what compiled steps take.
         links, work, pairs: (N,) LINK, (N,) WORK and (P,) PAIR records.
-        rows: (m + 3, 2 w + 2 m) constraint rows over the w degrees of freedom that they move (constraint.py).
+        rows: (m + 3, 2 w + 2 m + BOUNDS) constraint rows over the w degrees of freedom that they move (constraint.py).
         known: (nq + 2,) the configuration whose factors and rows stand in the memory, their rank, and the position error, m,
             that projection may leave there.
         parameters: the numbers of the effects.
@@ -59,7 +59,7 @@ class Memory:
             len(links) * LINK_SIZE,
             len(links) * WORK_SIZE,
             len(pairs) * PAIR_SIZE,
-            (m + 3) * (2 * width + 2 * m),
+            (m + 3) * (2 * width + 2 * m + BOUNDS),
             nq + 2,
             nq,
             vectors * nv,
@@ -73,13 +73,15 @@ class Memory:
         self.array[VECTORS], self.array[WORKSPACE], self.array[CONTACT_PART] = vectors, workspace, ends[9]
         own = [self.array[a:b] for a, b in pairwise(ends)]
         self.links, self.work, self.pairs = own[0].view(LINK), own[1].view(WORK), own[2].view(PAIR)
-        self.rows = own[3].reshape(m + 3, 2 * width + 2 * m)
+        self.rows = own[3].reshape(m + 3, 2 * width + 2 * m + BOUNDS)
         self.known, self.parameters = own[4], own[8]
         self.spare = own[6].reshape(vectors, nv)
         self.contact_part = own[9]
         if contact_part is not None:
             own[9][:] = contact_part
         self.links[:], self.pairs[:], self.parameters[:] = links, pairs, parameters
+        if m:
+            self.rows[:m, -BOUNDS:] = row_bounds(links, pairs, width)
 
 
 @intrinsic

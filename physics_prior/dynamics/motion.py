@@ -13,7 +13,7 @@ from physics_prior.dynamics.articulated_body import accelerate, factorize
 from physics_prior.dynamics.constraint import (
     POSITION_TOLERANCE,
     UNMET,
-    constrain_acceleration,
+    accelerate_constrained,
     multiply_columns,
     refresh,
     responses,
@@ -65,9 +65,10 @@ def evaluate_at(memory: Array, q: Array, v: Array, extra: Array, step: float, vd
         take_at_middle(links, work, step)
     copy(extra, tau)
     forces(parameters, links, work, q, v, tau)
-    accelerate(links, work, tau, gravity, vdot)
     if CONSTRAINED:
-        unmet = constrain_acceleration(links, work, pairs, rows, gravity, vdot, spare)
+        unmet = accelerate_constrained(links, work, pairs, rows, tau, gravity, vdot, spare[0])
+    else:
+        accelerate(links, work, tau, gravity, vdot)
     return rank, unmet
 
 
@@ -136,7 +137,7 @@ def differentiate(memory: Array, tangent: Array, q: Array, v: Array, step: float
     solve_mass(freedoms, M, derivative)
     if CONSTRAINED:
         response, right, answer, change = correction_sections(scratch, m, nv, 2 * nv)
-        responses(links, work, rows, spare[0], response)
+        responses(links, work, pairs, rows, spare[0], response)
         clear(right)
         add_product(A, derivative, right)
         for r in range(m):
@@ -174,7 +175,7 @@ def project_columns(memory: Array, A: Array, A_q: Array, columns: Array, scratch
     m, nv = A.shape
     by_q, by_v = columns[:nv], columns[nv:]
     response, right, answer, change = correction_sections(scratch, m, nv, columns.shape[1])
-    responses(links, work, rows, spare[0], response)
+    responses(links, work, pairs, rows, spare[0], response)
     clear(right)
     add_product(A, by_q, right)
     if as_caught:

@@ -2,18 +2,24 @@
 
 import math
 
+from physics_prior.dynamics.arrays import accumulate, clear
+from physics_prior.dynamics.articulated_body import pull
 from physics_prior.dynamics.constraint import (
+    REFINEMENTS,
     complete,
+    gather_rows,
     multiply,
     place,
     position_error,
     respond,
     row_count,
     velocity_error,
+    width,
 )
 from physics_prior.dynamics.kernel import kernel
-from physics_prior.dynamics.kinematics import flow, pose
-from physics_prior.dynamics.manifold import displace
+from physics_prior.dynamics.kinematics import flow_part, pose_part
+from physics_prior.dynamics.manifold import displace_part
+from physics_prior.dynamics.records import ALL
 from physics_prior.dynamics.types import Array, Records
 
 ITERATIONS = 40  # at a fold each makes the error but four times smaller
@@ -38,11 +44,14 @@ def project(
 
     q moves by -M^-1 A^T (A M^-1 A^T)^-1 e until e is within tolerance, v by the same map of A v (design eq. 11). The factors of a
     configuration nearby, which the workspace must hold, serve q as long as they make e ten times smaller (simplified
-    Newton's method); the velocity has those of the final q, and the next step finds them there. spare (2, nv).
+    Newton's method); the velocity has those of the final q, and the next step finds them there. Each pass moves the links that
+    rows move; the others follow in the end. spare: three vectors (nv,).
     """
-    right = rows[row_count(rows)]
+    right, w = rows[row_count(rows)], width(rows)
+    z, delta, rest = spare[0], spare[1], spare[4]
     before, exact = math.inf, False
-    pose(links, work, q)
+    clear(rest)
+    pose_part(links, work, q, 0, w)
     place(work, pairs)
     error = position_error(pairs, right)
     for _ in range(ITERATIONS):
@@ -52,31 +61,47 @@ def project(
         if slow:
             if error <= STALL or (exact and error > 0.5 * before):
                 break
+            follow(links, work, w, rest, delta, q)
             complete(links, work, pairs, rows, known, q)
         before, exact = error, slow
-        multiply(rows)
-        respond(links, work, rows, spare[0], spare[1])
+        multiply(rows, REFINEMENTS if exact else 1)
+        clear(z)
+        clear(delta)
+        gather_rows(pairs, rows, w, z)
+        pull(links, work, z, w, delta)
         farthest = 0.0
         for k in range(v.shape[0]):
-            farthest = max(farthest, abs(spare[1, k]))
-        if farthest > FARTHEST:
-            for k in range(v.shape[0]):
-                spare[1, k] *= FARTHEST / farthest
-        displace(links, q, spare[1], q)
-        pose(links, work, q)
+            farthest = max(farthest, abs(delta[k]))
+        share = FARTHEST / farthest if farthest > FARTHEST else 1.0
+        for k in range(v.shape[0]):
+            delta[k] *= share
+        accumulate(share, z, rest)
+        displace_part(links, q, delta, 0, w, q)
+        pose_part(links, work, q, 0, w)
         place(work, pairs)
         error = position_error(pairs, right)
+    follow(links, work, w, rest, delta, q)
     complete(links, work, pairs, rows, known, q)
     project_velocity(links, work, pairs, rows, v, spare)
     return error
 
 
 @kernel
+def follow(links: Records, work: Records, w: int, z: Array, delta: Array, q: Array) -> None:
+    """Move the links that rows do not move as z (nv,), which is then cleared, moves them through the factors, and pose them."""
+    if w < delta.shape[0]:
+        pull(links, work, z, ALL, delta)
+        displace_part(links, q, delta, w, ALL, q)
+        pose_part(links, work, q, w, ALL)
+        clear(z)
+
+
+@kernel
 def project_velocity(links: Records, work: Records, pairs: Records, rows: Array, v: Array, spare: Array) -> None:
     """Put v (nv,) onto the constraints by the impulse that takes it there (design eq. 9); needs factors and rows of q."""
-    flow(links, work, v)
+    flow_part(links, work, v, width(rows))
     velocity_error(work, pairs, rows[row_count(rows)])
-    multiply(rows)
-    respond(links, work, rows, spare[0], spare[1])
+    multiply(rows, REFINEMENTS)
+    respond(links, work, pairs, rows, spare[0], spare[1])
     for k in range(v.shape[0]):
         v[k] += spare[1, k]

@@ -7,7 +7,12 @@ import numpy as np
 from physics_prior import rotations
 from physics_prior.effects.effect import PointPair
 from physics_prior.model import JointKind, Tree
+from physics_prior.model.joint import FREEDOMS
 
+ALL = 1 << 62
+"""Beyond every column: the end of a range that leaves no link out."""
+BOUNDS = 3
+"""Numbers at the end of a constraint row: where its columns begin and end, and the row behind the last that shares any."""
 REVOLUTE, PRISMATIC, SPHERICAL, FREE = (int(kind) for kind in JointKind if kind is not JointKind.FIXED)
 
 LINK = np.dtype(
@@ -136,6 +141,21 @@ def pair_records(tree: Tree, pairs: list[PointPair]) -> np.ndarray:
         record["directions"][: 3 * rows] = (pair.directions[:rows] @ R.T).ravel()
         first += rows
     return records
+
+
+def row_bounds(links: np.ndarray, pairs: np.ndarray, columns: int) -> np.ndarray:
+    """The BOUNDS (m, 3) of the pairs' rows; the last number never falls, as elimination fills rows in."""
+    moved = np.zeros((int(pairs["rows"].sum()), columns), dtype=bool)
+    for pair in pairs:
+        for i in (int(pair["link_a"]), int(pair["link_b"])):
+            while i >= 0:
+                first, column = pair["first"], links[i]["column"]
+                moved[first : first + pair["rows"], column : column + FREEDOMS[links[i]["kind"]]] = True
+                i = int(links[i]["parent"])
+    begin, end = moved.argmax(axis=1), columns - moved[:, ::-1].argmax(axis=1)
+    meet = (begin[:, None] < end) & (begin < end[:, None])
+    reach = len(moved) - meet[:, ::-1].argmax(axis=1)
+    return np.stack([begin, end, np.maximum.accumulate(reach)], axis=1)
 
 
 def motion_tables(tree: Tree, pairs: list[PointPair], records: np.ndarray, begin: int) -> np.ndarray:

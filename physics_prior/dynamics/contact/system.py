@@ -10,6 +10,7 @@ from physics_prior.dynamics.articulated_body import pull, push, push_joint, push
 from physics_prior.dynamics.constraint import point_velocity, row_count, width
 from physics_prior.dynamics.contact.complementarity import BILATERAL, DISC, NORMAL, PARTNER
 from physics_prior.dynamics.kernel import inline_kernel, kernel
+from physics_prior.dynamics.records import ALL
 from physics_prior.dynamics.types import Array, Record, Records, Vector
 
 NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -148,7 +149,7 @@ def respond_to(links: Records, work: Records, Z: Array, impulses: Array, m: int,
         if known != 0.0:
             for k in range(Z.shape[1]):
                 z[k] += Z[r, k] * known
-    pull(links, work, z, change)
+    pull(links, work, z, ALL, change)
 
 
 @kernel

@@ -150,6 +150,22 @@ def transposed(m: Matrix) -> Matrix:
 
 
 @inline_kernel
+def symmetric_product(a: Symmetric, h: Matrix) -> Matrix:
+    """The product of a symmetric 6-tuple and a 9-tuple."""
+    return (
+        dots(a[0], a[1], a[2], h[0], h[3], h[6]),
+        dots(a[0], a[1], a[2], h[1], h[4], h[7]),
+        dots(a[0], a[1], a[2], h[2], h[5], h[8]),
+        dots(a[1], a[3], a[4], h[0], h[3], h[6]),
+        dots(a[1], a[3], a[4], h[1], h[4], h[7]),
+        dots(a[1], a[3], a[4], h[2], h[5], h[8]),
+        dots(a[2], a[4], a[5], h[0], h[3], h[6]),
+        dots(a[2], a[4], a[5], h[1], h[4], h[7]),
+        dots(a[2], a[4], a[5], h[2], h[5], h[8]),
+    )
+
+
+@inline_kernel
 def symmetric_times(m: Symmetric, u: Vector) -> Vector:
     """The product m u of a symmetric matrix (6-tuple) and a vector."""
     return (

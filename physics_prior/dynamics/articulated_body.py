@@ -14,7 +14,6 @@ from physics_prior.dynamics.algebra import (
     difference9,
     dot,
     dot_on,
-    dots,
     fma,
     full,
     get3,
@@ -31,6 +30,7 @@ from physics_prior.dynamics.algebra import (
     scale,
     sum9,
     symmetric_inverse,
+    symmetric_product,
     symmetric_times,
     times,
     transposed_times,
@@ -117,22 +117,6 @@ def _minus_symmetric(m: Symmetric, u: Vector, w: Vector) -> Symmetric:
 
 
 @inline_kernel
-def _symmetric_product(a: Symmetric, h: Matrix) -> Matrix:
-    """The product of a symmetric 6-tuple and a 9-tuple."""
-    return (
-        dots(a[0], a[1], a[2], h[0], h[3], h[6]),
-        dots(a[0], a[1], a[2], h[1], h[4], h[7]),
-        dots(a[0], a[1], a[2], h[2], h[5], h[8]),
-        dots(a[1], a[3], a[4], h[0], h[3], h[6]),
-        dots(a[1], a[3], a[4], h[1], h[4], h[7]),
-        dots(a[1], a[3], a[4], h[2], h[5], h[8]),
-        dots(a[2], a[4], a[5], h[0], h[3], h[6]),
-        dots(a[2], a[4], a[5], h[1], h[4], h[7]),
-        dots(a[2], a[4], a[5], h[2], h[5], h[8]),
-    )
-
-
-@inline_kernel
 def rigid_inertias(links: Records, work: Records) -> None:
     """Fill J, H and M of every link with those of the rigid link about its own joint; needs the kinematics."""
     work[0].factored = 0
@@ -187,7 +171,7 @@ def factorize(links: Records, work: Records) -> None:
         else:
             inverse = symmetric_inverse(J)
             put6(here.J_inverse, inverse)
-            K = _symmetric_product(inverse, H)
+            K = symmetric_product(inverse, H)
             put9(here.K, K)
             M = _schur(M, H, K)
             put6(here.M, M)

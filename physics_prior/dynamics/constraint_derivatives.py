@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from physics_prior.dynamics.algebra import add3, cross, dot, get3, minus, plus, put3, scale
-from physics_prior.dynamics.constraint import approach, direction, relative_acceleration
+from physics_prior.dynamics.constraint_errors import approach, direction, relative_acceleration
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import freedoms
 from physics_prior.dynamics.records import FREE

@@ -4,18 +4,8 @@ import math
 
 from physics_prior.dynamics.arrays import accumulate, clear
 from physics_prior.dynamics.articulated_body import pull
-from physics_prior.dynamics.constraint import (
-    REFINEMENTS,
-    complete,
-    gather_rows,
-    multiply,
-    place,
-    position_error,
-    respond,
-    row_count,
-    velocity_error,
-    width,
-)
+from physics_prior.dynamics.constraint import REFINEMENTS, complete, gather_rows, multiply, respond, row_count, width
+from physics_prior.dynamics.constraint_errors import place, position_error, velocity_error
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kinematics import flow_part, pose_part
 from physics_prior.dynamics.manifold import displace_part

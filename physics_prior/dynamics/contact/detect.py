@@ -16,7 +16,7 @@ from physics_prior.dynamics.algebra import (
     scale,
     times,
 )
-from physics_prior.dynamics.constraint import point_velocity
+from physics_prior.dynamics.constraint_errors import point_velocity
 from physics_prior.dynamics.contact.geometry.pairs import touch
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.types import Array, Matrix, Record, Records, Vector

@@ -10,7 +10,8 @@ import math
 from physics_prior.dynamics.algebra import add3, cross, get3, minus, plus, scale
 from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.articulated_body import factorize
-from physics_prior.dynamics.constraint import direction, position_error, refresh, row_count, velocity_error
+from physics_prior.dynamics.constraint import refresh, row_count
+from physics_prior.dynamics.constraint_errors import direction, position_error, velocity_error
 from physics_prior.dynamics.contact.complementarity import DISC, complement
 from physics_prior.dynamics.contact.detect import TOUCHING, collect, look
 from physics_prior.dynamics.contact.memory import contact_sections, remember, remembered

@@ -7,7 +7,8 @@ A M^-1 A^T = Y Z^T.
 from physics_prior.dynamics.algebra import ZERO, add3, cross, dot, get3, get9, minus, minus9, plus, scale
 from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.articulated_body import pull, push, push_joint, push_wrenches
-from physics_prior.dynamics.constraint import point_velocity, row_count, width
+from physics_prior.dynamics.constraint import row_count, width
+from physics_prior.dynamics.constraint_errors import point_velocity
 from physics_prior.dynamics.contact.complementarity import BILATERAL, DISC, NORMAL, PARTNER
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import ALL

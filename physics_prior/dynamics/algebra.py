@@ -5,6 +5,7 @@ written with fused multiply-adds, half the instructions; the optimiser may fuse 
 where a function is inlined.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 from numba import types
@@ -18,13 +19,16 @@ IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 @intrinsic
-def fma(_typing_context: Any, a: Any, b: Any, c: Any) -> Any:
-    """The sum a b + c, rounded once."""
+def _fma(_typing_context: Any, a: Any, b: Any, c: Any) -> Any:
 
     def build(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         return builder.fma(*arguments)
 
     return types.float64(types.float64, types.float64, types.float64), build
+
+
+fma: Callable[[float, float, float], float] = _fma
+"""The sum a b + c, rounded once."""
 
 
 @inline_kernel

@@ -8,6 +8,7 @@ import numpy as np
 from physics_prior import rotations
 from physics_prior.dynamics import anchor_motion, constraint, kinematics, manifold, newton_euler, projection
 from physics_prior.dynamics.compose import GRAVITY, pack_parameters, step_module
+from physics_prior.dynamics.constraint_errors import place, position_error
 from physics_prior.dynamics.contact import impulse
 from physics_prior.dynamics.contact.memory import Sleep, candidates_in, contact_memory, residual_in, rested_in
 from physics_prior.dynamics.contact.reactions import candidates_by_name, reaction
@@ -216,8 +217,8 @@ class Simulator:
         self.move(q, v)
         if self.rows:
             self._move_anchors()
-            constraint.place(self._work, self._pairs)
-            constraint.position_error(self._pairs, out)
+            place(self._work, self._pairs)
+            position_error(self._pairs, out)
         return -out
 
     def move(self, q: np.ndarray, v: np.ndarray) -> None:
@@ -326,7 +327,7 @@ class Simulator:
     def wrenches(self, q: np.ndarray, v: np.ndarray, vdot: np.ndarray | None = None) -> dict[str, Wrench]:
         """``wrench_array`` by name, each with its point."""
         array = self.wrench_array(q, v, vdot)
-        constraint.place(self._work, self._pairs)
+        place(self._work, self._pairs)
         points = [
             *self._work["origin"],
             *(self._pairs["b"][first] for _, first, _ in self._labels),

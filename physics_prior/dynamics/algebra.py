@@ -20,7 +20,6 @@ IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 @intrinsic
 def _fma(_typing_context: Any, a: Any, b: Any, c: Any) -> Any:
-
     def build(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         return builder.fma(*arguments)
 

@@ -83,7 +83,9 @@ def _of_joint(place: Place, link: Link, units: tuple[str, str]) -> np.ndarray:
     if kind is JointKind.SPHERICAL and place.is_list:
         axes = place.entries()
         if len(axes) != size:
-            raise place.error(f"{shown(place.value)} has {len(axes)} entries: give one number, or one for each of x, y and z")
+            raise place.error(
+                f"{shown(place.value)} has {len(axes)} entries: give one number, or one for each of x, y and z"
+            )
         return np.array([_deviation(each, units[1]) for each in axes])
     return np.full(size, _deviation(place, units[0] if kind is JointKind.PRISMATIC else units[1]))
 

@@ -17,8 +17,7 @@ from rich.table import Table
 
 from physics_prior.dynamics import kinematics, manifold
 from physics_prior.errors import SimulationError
-from physics_prior.estimation import filter as filtering
-from physics_prior.estimation import observation
+from physics_prior.estimation import gain, observation
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.estimation.measurement import PointsMeasurement
 from physics_prior.interface.intake import measurement_of
@@ -141,7 +140,7 @@ def _split(scene: Scene, recording: list[Moment]) -> dict[str, float]:
     with ExitStack() as stack:
         for place, name in (
             (simulator.step, "carry"),
-            (filtering, "innovate"),
+            (gain, "innovate"),
             (observation, "see_frame"),
             (kinematics, "move"),
             (manifold, "displace"),

@@ -144,12 +144,13 @@ class Filter:
         seen = self.innovation(measurement, prior.state)
         if len(seen.y) == 0:
             return self._fresh(prior)
-        many, believed = gated and len(seen.y) > seen.block, np.ones(len(seen.y) // seen.block, dtype=bool)
+        many, doubtful, partly = gated and len(seen.y) > seen.block, False, False
         if many:
             believed = seen.squares(prior.factor) <= self.gate_limit(seen.block)
-        doubtful = float(np.mean(believed)) < QUORUM
-        if not (doubtful or believed.all()):
-            seen = seen.kept(believed)
+            doubtful = float(np.mean(believed)) < QUORUM
+            partly = not (doubtful or believed.all())
+            if partly:
+                seen = seen.kept(believed)
         U = np.ascontiguousarray(prior.factor.T)
         gain = gain_of(U, seen)
         if doubtful or (gated and not many and not gain.nis <= self.gate_limit(len(seen.y))):
@@ -166,7 +167,7 @@ class Filter:
         last = gain
         for _ in range(ITERATIONS - 1 if gain.largest >= SMALL_CORRECTION else 0):
             seen = self.innovation(measurement, state)
-            seen = seen if believed.all() else seen.kept(believed)
+            seen = seen.kept(believed) if partly else seen
             from_prior = self.process.difference(prior.state, state)
             last = gain_of(U, replace(seen, y=seen.y + seen.H @ from_prior[: seen.H.shape[1]]))
             state = self.process.displace(prior.state, last.correction)

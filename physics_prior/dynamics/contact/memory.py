@@ -36,7 +36,10 @@ def contact_memory(
     for each in candidates:
         slots = 1 if each["is_limit"] else SLOTS
         contacts += slots
-        rows += slots * (1 + 2 * (each["friction"] > 0.0) + 2 * (each["rolling"] > 0.0))
+        slides = (
+            max(each["friction"], each["friction_deviation"]) > 0.0
+        )  # the estimator may try more friction than none
+        rows += slots * (1 + 2 * slides + 2 * (each["rolling"] > 0.0))
     m = equalities + rows
     sizes = [
         len(candidates) * CANDIDATE_SIZE,

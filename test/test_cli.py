@@ -138,6 +138,7 @@ def test_version(capsys):
         (["replay", "BAG", "--scene", "pendulum", "--plot", "none/new.png"], "--plot none/new.png", "does not exist"),
         (["replay", "BAG", "--scene", "pendulum", "--json", "none/new"], "--json none/new", "does not exist"),
         (["replay", "BAG", "--scene", "pendulum", "--json", "."], "--json .", "give a file"),
+        (["urdf", "pendulum", "-o", "none/new"], "--output none/new", "does not exist"),
         (["bench", "--json", "none/new"], "--json none/new", "does not exist"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",

@@ -1,5 +1,6 @@
 """A calibrated person as a scene file."""
 
+import json
 import textwrap
 
 import numpy as np
@@ -17,7 +18,8 @@ TONE = 10.0  # 1/s: what joints that no marker tells come to rest by
 def scene_text(found: Calibration, markers: MarkerSet, topic: str, frame_id: str, origin: str, scale: float) -> str:
     """The text of a scene: the person, the markers of a topic where they are on it, and noise to track it by.
 
-    origin: one line that says what it was made from. scale: of the markers' noise over what is left of them in the trial.
+    topic, frame_id: of a recording, and so quoted. origin: one line that says what it was made from. scale: of the
+    markers' noise over what is left of them in the trial.
     """
     human, ease = found.human, _ease(found)
     lengths = "\n".join(
@@ -41,7 +43,7 @@ def scene_text(found: Calibration, markers: MarkerSet, topic: str, frame_id: str
 description: >-
   A person of {human.mass:g} kg and {human.height:.2f} m with the markers of '{markers.name}', calibrated from
   {found.frames} frames; they fit to {1e3 * found.rms:.1f} mm per axis, root mean square.
-frame_id: {frame_id}
+frame_id: {json.dumps(frame_id)}
 model:
   human:
     mass: {human.mass:g} kg
@@ -59,7 +61,7 @@ effects:
 {_damping(found, ease)}
 measurements:
   - points:
-      topic: {topic}
+      topic: {json.dumps(topic)}
       noise: {scale * max(found.rms, LEAST_NOISE):.5f}
       markers:
 """

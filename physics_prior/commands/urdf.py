@@ -11,6 +11,8 @@ Examples:
 import argparse
 from pathlib import Path
 
+from physics_prior.commands.terminal import require_folder, whole_file
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the arguments of `urdf`."""
@@ -20,6 +22,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the file; 0."""
+    if args.output is not None:
+        require_folder("--output", str(args.output))
     from physics_prior.model.urdf_out import urdf_from_tree
     from physics_prior.scene import load_scene
 
@@ -28,6 +32,7 @@ def run(args: argparse.Namespace) -> int:
     if args.output is None:
         print(text, end="")
     else:
-        args.output.write_text(text, encoding="utf-8")
+        with whole_file(args.output) as partial:
+            partial.write_text(text, encoding="utf-8")
         print(f"{args.output}: written")
     return 0

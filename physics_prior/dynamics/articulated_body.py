@@ -37,6 +37,7 @@ from physics_prior.dynamics.algebra import (
 )
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import ALL, FREE, PRISMATIC, REVOLUTE
+from physics_prior.dynamics.spatial import inertia_about
 from physics_prior.dynamics.types import Array, Matrix, Record, Records, Symmetric, Vector
 
 
@@ -124,18 +125,7 @@ def rigid_inertias(links: Records, work: Records) -> None:
         here = work[i]
         m = links[i].mass
         x, y, z = get3(here.center)
-        c = get6(here.inertia)
-        put6(
-            here.J,
-            (
-                c[0] + m * (y * y + z * z),
-                c[1] - m * x * y,
-                c[2] - m * x * z,
-                c[3] + m * (x * x + z * z),
-                c[4] - m * y * z,
-                c[5] + m * (x * x + y * y),
-            ),
-        )
+        put6(here.J, inertia_about(get6(here.inertia), m, (x, y, z)))
         put9(here.H, (0.0, -m * z, m * y, m * z, 0.0, -m * x, -m * y, m * x, 0.0))
         put6(here.M, (m, 0.0, 0.0, m, 0.0, m))
 

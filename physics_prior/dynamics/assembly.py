@@ -15,9 +15,7 @@ ASSEMBLED = 1e-10  # m: what may be left
 NEAR = 1e-6  # m: from here on, projection does the rest
 STEPS = 100
 SHORTEST = 1e-6  # of a Newton step
-LONGEST = (
-    1e3  # rad or m of a freedom in one step: so far out that rounding closes whatever is open, nothing is put together
-)
+LONGEST = 1e3  # rad or m of a freedom in one step: further out rounding closes whatever is open
 GAIN = 0.1  # share of what a step promises that it must keep
 LARGEST_TURN = 0.5  # rad in one step
 

@@ -36,9 +36,7 @@ REGULARISATION = 1e-10  # of a row's scale: small steps are not safer near a sin
 DEPENDENT = 1e3  # a pivot within this factor of the regularisation belongs to a row that adds nothing
 REFINEMENTS = 3
 EXACT = 1e-15  # of the right side: refinement stops there
-UNMET = (
-    1e-11  # of the right side: more is left only of rows that contradict each other, or hardly hold a motion (a fold)
-)
+UNMET = 1e-11  # of the right side: more is left of rows that contradict each other, or hardly hold a motion (a fold)
 POSITION_TOLERANCE = 1e-11  # m: what projection leaves
 ROUNDING = 1e-15  # m: no projection goes below
 

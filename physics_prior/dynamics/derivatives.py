@@ -36,6 +36,7 @@ from physics_prior.dynamics.spatial import (
     cross_force,
     cross_motion,
     get_spatial,
+    inertia_about,
     power,
     put_spatial,
 )
@@ -151,21 +152,10 @@ def sweep(
             put_spatial(record.psi_ddot, add(cross_motion(A_up, S), cross_motion(V_up, psi_dot)))
         inertia, mass, center = get6(here.inertia), link.mass, plus(d, get3(here.center))
         linear = scale(mass, at_point(V, center))
-        x, y, z = center
         own.mass = mass
         put3(own.first, scale(mass, center))
         put3(own.momentum, linear)
-        put6(
-            own.inertia,
-            (
-                inertia[0] + mass * (y * y + z * z),
-                inertia[1] - mass * x * y,
-                inertia[2] - mass * x * z,
-                inertia[3] + mass * (x * x + z * z),
-                inertia[4] - mass * y * z,
-                inertia[5] + mass * (x * x + y * y),
-            ),
-        )
+        put6(own.inertia, inertia_about(inertia, mass, center))
         # and the moment of the force 2 turn x momentum at the centre
         B = minus_outer(_turning_coriolis(inertia, omega), scale(2.0, linear), center)
         along = 2.0 * dot(center, linear)

@@ -5,7 +5,7 @@ A motion is (angular, linear), a force is (moment, force).
 
 from physics_prior.dynamics.algebra import cross, dot, get3, plus, put3
 from physics_prior.dynamics.kernel import inline_kernel
-from physics_prior.dynamics.types import Array, Spatial, Vector
+from physics_prior.dynamics.types import Array, Spatial, Symmetric, Vector
 
 
 @inline_kernel
@@ -25,6 +25,20 @@ def put_spatial(a: Array, u: Spatial) -> None:
 def add(u: Spatial, w: Spatial) -> Spatial:
     """The sum of two spatial vectors of a kind."""
     return plus(u[0], w[0]), plus(u[1], w[1])
+
+
+@inline_kernel
+def inertia_about(inertia: Symmetric, mass: float, center: Vector) -> Symmetric:
+    """The inertia about a point from that about the centre of mass, which is at center from it (Steiner)."""
+    x, y, z = center
+    return (
+        inertia[0] + mass * (y * y + z * z),
+        inertia[1] - mass * x * y,
+        inertia[2] - mass * x * z,
+        inertia[3] + mass * (x * x + z * z),
+        inertia[4] - mass * y * z,
+        inertia[5] + mass * (x * x + y * y),
+    )
 
 
 @inline_kernel

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from physics_prior import rotations
-from physics_prior.calibration import calibrate
+from physics_prior.calibration import calibrate, scene_text
 from physics_prior.calibration.frames import Frames
 from physics_prior.calibration.normal_equations import Normal
 from physics_prior.cli import main
@@ -58,6 +59,15 @@ def test_lengths_and_places_are_found_within_what_is_said(found):
     off = np.array(list(fit.places.values())) - places
     assert np.max(np.abs(off) / np.array(list(fit.place_deviations.values()))) < 4.0
     assert not {"left_forearm", "head"} & set(fit.informed)
+
+
+def test_names_of_a_recording_stay_names(found):
+    fit, _ = found
+    frame = 'lab"\neffects: []  # no gravity'
+    text = scene_text(fit, load_marker_set(MARKERS), "/markers", frame, "a test", 1.0)
+    scene = yaml.safe_load(text)
+    assert scene["frame_id"] == frame
+    assert "gravity" in scene["effects"]
 
 
 def test_the_same_trial_gives_the_same_person(found):

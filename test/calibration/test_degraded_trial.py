@@ -19,7 +19,7 @@ ADDED = 0.003  # m
 GAP, SWAP, EVERY = 0.3, 0.1, 0.8  # s
 GATE = chi2.ppf(0.999, 3)
 
-pytestmark = pytest.mark.skipif(not BAG.is_dir(), reason="the recording is not here")
+pytestmark = pytest.mark.skipif(not BAG.is_dir(), reason=f"missing {BAG}")
 
 
 def degraded(frames: list[PointsMeasurement], rng: np.random.Generator) -> tuple[list[PointsMeasurement], np.ndarray]:
@@ -70,5 +70,6 @@ def test_a_bad_day_does_not_lose_the_walker():
     assert np.sqrt(np.mean(np.sum(np.concatenate(errors) ** 2, axis=1))) < 0.025  # measured: 8.1 mm
     used = [node.posterior for node in nodes if node.posterior.used]
     ratio = sum(each.nis for each in used) / sum(each.dimension for each in used)
-    # what passes the gate of 0.999 has a mean of 0.995 of what all had; measured: 0.990
-    assert ratio == pytest.approx(chi2.cdf(GATE, 5) / chi2.cdf(GATE, 3), abs=0.01)
+    # what passes the gate of 0.999 has a mean of 0.995 of what all had; the 95 % band of as many rows. Measured: 0.990
+    rows = sum(each.dimension for each in used)
+    assert ratio == pytest.approx(chi2.cdf(GATE, 5) / chi2.cdf(GATE, 3), abs=1.96 * np.sqrt(2.0 / rows))

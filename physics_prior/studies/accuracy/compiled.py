@@ -19,18 +19,18 @@ class Compiled:
     engine: str = "compiled"
 
     def __post_init__(self) -> None:
-        self._simulators: dict[float | None, Simulator] = {}
+        self._simulators: dict[tuple[Benchmark, float | None], Simulator] = {}
 
     def trajectory(self, benchmark: Benchmark, setting: Setting) -> Trajectory:
         """As ``Scheme`` says."""
-        simulator = self._simulators.get(setting.tolerance)
+        simulator = self._simulators.get((benchmark, setting.tolerance))
         q, v = benchmark.q.copy(), benchmark.v.copy()
         if simulator is None:
             allowed = TOLERATED if setting.tolerance is None else setting.tolerance
             simulator = Simulator(benchmark.tree, benchmark.effects, self.integrator, allowed)
             simulator.begin(q, v)
             simulator.advance(q.copy(), v.copy(), 1e-6)  # loads or compiles what is timed below
-            self._simulators[setting.tolerance] = simulator
+            self._simulators[benchmark, setting.tolerance] = simulator
         simulator.begin(q, v)
         return run_timed(
             benchmark,

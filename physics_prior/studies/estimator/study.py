@@ -1,7 +1,6 @@
 """Run every variant on simulated recordings: error, consistency and force error against microseconds a measurement."""
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import thread_time_ns
@@ -17,13 +16,11 @@ from physics_prior.estimation.history import Node
 from physics_prior.estimation.measurement import Measurement
 from physics_prior.estimation.smoother import smooth
 from physics_prior.estimation.square_root import normalised_error
-from physics_prior.interface.intake import measurement_of
 from physics_prior.model import JointKind
-from physics_prior.recording.cdr import decode
-from physics_prior.recording.reader import open_bag
 from physics_prior.recording.replay import replay
 from physics_prior.recording.simulate import Moment
 from physics_prior.scene import Scene
+from physics_prior.studies.effects.likelihood import read_measurements
 from physics_prior.studies.estimator.variants import PROBLEMS, STEPS, VARIANTS, Variant
 from physics_prior.studies.moving_human import moments
 
@@ -122,13 +119,10 @@ def run_recording(bag: Path, scene: Scene, reference: str | None, progress: Call
 
 
 def _measured(bag: Path, scene: Scene) -> list[list[Measurement]]:
-    """What a recording measured, stamp by stamp; messages that are no measurements are left out."""
-    reader, sources = open_bag(bag), {source.topic: source for source in scene.measurements}
+    """What a recording measured, stamp by stamp."""
     stamps: dict[int, list[Measurement]] = {}
-    for record in reader.read(sources):
-        with suppress(PhysicsPriorError):
-            measurement = measurement_of(sources[record.topic], decode(record.message_type, record.data), scene)
-            stamps.setdefault(measurement.stamp, []).append(measurement)
+    for measurement in read_measurements(bag, scene):
+        stamps.setdefault(measurement.stamp, []).append(measurement)
     return list(stamps.values())
 
 

@@ -120,8 +120,9 @@ def test_a_cube_that_slides_calls_for_contact_and_friction(sliding_cube):
 def test_real_tosses_call_for_contact_and_friction(shared):
     text = SceneText.read("cube_toss")
     bags = [shared / "bags" / f"cube_toss_{toss}_noisy" for toss in (172, 410)]
-    if not all(bag.exists() for bag in bags):
-        pytest.skip("recordings of tosses are missing: they are not shipped")
+    missing = [str(bag) for bag in bags if not bag.exists()]
+    if missing:
+        pytest.skip(f"missing {', '.join(missing)}")
     recordings = [read_measurements(bag, text.build()) for bag in bags]
     verdicts = {each.name: each for each in ablate(text, recordings).verdicts}
     assert all(verdicts[name].keep for name in FRICTION_NEEDS)

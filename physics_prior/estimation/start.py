@@ -16,6 +16,7 @@ from physics_prior.scene import PointsSource
 
 ITERATIONS = 30
 CONVERGED = 1e-9  # rad or m, or of the largest coordinate
+SETTLED = 1e-3  # of the estimate's own standard deviations: as good, where large residuals let iterations creep
 LARGEST_TURN = 1.0  # rad in one iteration: beyond it a linearisation says nothing; lengths may go any way
 OBSERVABLE = 1e-6  # least relative singular value of the whitened measurements by a freedom
 TRIES = 6  # starting configurations: the scene's own, then random ones (always the same)
@@ -220,7 +221,7 @@ def _gauss_newton(
         if np.max(np.abs(step)) < CONVERGED * max(1.0, float(np.max(np.abs(state.q)))):
             break
     else:
-        converged = False
+        converged = float(np.linalg.norm(U.T @ y)) < SETTLED
     factor = np.zeros((simulator.nv, simulator.nv))
     factor[:, : basis.shape[1]] = basis @ V.T / s
     cost = float(y @ y - np.sum((U.T @ y) ** 2))

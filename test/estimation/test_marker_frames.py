@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from physics_prior import rotations
@@ -142,6 +142,7 @@ def test_where_most_markers_are_refused_so_is_the_frame(filter_with):
 
 
 @settings(max_examples=12)
+@example(seed=2419435705, yaw=0.0, markers="plug_in_gait")  # each iteration leaves 0.66 of a weakly seen joint's error
 @given(seed=st.integers(0, 2**32 - 1), yaw=st.floats(-np.pi, np.pi), markers=st.sampled_from(SETS))
 def test_one_frame_of_markers_is_a_start(filter_with, seed, yaw, markers):
     """Facing anywhere, from the scene's own place and posture, within what its covariance says."""

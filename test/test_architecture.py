@@ -26,7 +26,7 @@ ROOMS = [
     + ("recording.bag", "recording.reader", "recording.writer", "recording"),
     ("estimation",),
     ("interface",),
-    ("recording.simulate", "recording.truth", "recording.replay", "interface.warm_up"),
+    ("recording.simulate", "recording.truth", "recording.references", "recording.replay", "interface.warm_up"),
     ("calibration",),
     ("studies",),
     ("commands", "ros_inputs", "ros_parameters"),

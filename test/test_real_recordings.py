@@ -26,7 +26,9 @@ def bag(shared: Path, name: str) -> Path:
 
 def pendulum(shared: Path, name: str, smooth: bool = False, process: str = "physics") -> ReplayResult:
     scene = load_scene("uw_double_pendulum")
-    return replay(bag(shared, f"uw_double_pendulum_{name}"), scene, smooth=smooth, process=process, reference=REFERENCE)
+    return replay(
+        bag(shared, f"uw_double_pendulum_{name}"), scene, smooth=smooth, process=process, references=[REFERENCE]
+    )
 
 
 # name, smoothed, bounds of angle [deg], rate [rad/s], force [% of weight]; beside them what was measured

@@ -115,7 +115,7 @@ def _error(scene: "Scene", bags: list[Path], reference: str | None) -> float | N
         return None
     errors = []
     for bag in bags:
-        score = replay(bag, scene, reference=reference).score or {}
+        score = replay(bag, scene, references=[reference]).score or {}
         error = score.get("position_rmse_deg") or score.get("position_rmse_m")
         if error is not None:
             errors.append(error)

@@ -8,6 +8,7 @@ Examples:
   physics-prior replay my_bag --scene double_pendulum
   physics-prior replay my_bag --scene double_pendulum --smooth -o estimates --plot estimates.png
   physics-prior replay my_bag --scene my_scene.yaml --reference /truth/joint_states --json -
+  physics-prior replay my_walk --scene my_person.yaml --smooth --reference /force_plate/1 --reference /force_plate/2
 """
 
 import argparse
@@ -31,7 +32,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what carries the state on between measurements: the scene's physics, or constant acceleration without"
         " any, to see what physics buys",
     )
-    parser.add_argument("--reference", metavar="TOPIC", help="a JointState topic of the bag to compare with")
+    parser.add_argument(
+        "--reference",
+        metavar="TOPIC",
+        action="append",
+        default=[],
+        help="a JointState topic of the bag to compare with, or a WrenchStamped of a force plate; may be repeated",
+    )
     parser.add_argument("--plot", metavar="FILE", help="draw the estimates: .png, .svg or .pdf")
     parser.add_argument("--json", metavar="FILE", help="write the figures as JSON; - prints that and nothing else")
 
@@ -60,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
             out=args.output,
             smooth=args.smooth,
             process=args.process,
-            reference=args.reference,
+            references=args.reference,
             progress=report,
         )
     if args.plot is not None:

@@ -20,6 +20,9 @@ def print_report(result: ReplayResult, written: Sequence[str]) -> None:
         out.print(f"salvaged: {result.loss}", style="bold yellow")
     figures = result.summary()
     out.print(_figures(result, figures))
+    if result.forces:
+        out.print()
+        out.print(_forces(figures["reference"]))
     if result.readouts:
         out.print()
         out.print(_readouts(result))
@@ -42,6 +45,23 @@ def _figures(result: ReplayResult, figures: dict[str, Any]) -> Table:
     for key, what in SCORES.items():
         if score is not None and score.get(key) is not None:
             out.add_row(f"RMSE of {what[0]}", f"{score[key]:.3g} {what[1]}, from {score['from_s']:g} s on")
+    return out
+
+
+def _forces(score: dict[str, Any]) -> Table:
+    """What the ground does, against force plates."""
+    title = f"forces of the ground, from {score['from_s']:g} s on"
+    out = table(title, "plate", "component", "RMSE, % of range", "% of weight", "r", "compared, s", numbers=4)
+    for name, components in score["forces"].items():
+        for component, own in components.items():
+            out.add_row(
+                name,
+                component.replace("_", "-"),
+                *(
+                    "-" if own[key] is None else f"{own[key]:.3g}"
+                    for key in ("rrmse_percent", "percent_weight", "r", "seconds")
+                ),
+            )
     return out
 
 

@@ -1,6 +1,6 @@
 """Contact: two convex surfaces that push each other apart, stick and slip."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -8,7 +8,7 @@ from pydantic import Field
 
 from physics_prior import rotations
 from physics_prior.effects.effect import Effect
-from physics_prior.effects.touching import Surface, TouchingPair
+from physics_prior.effects.touching import Footing, Surface, TouchingPair
 from physics_prior.errors import ModelError
 from physics_prior.model import Tree
 
@@ -78,6 +78,11 @@ class Contact(Effect):
 
     def reactions(self, tree: Tree) -> Sequence[str]:
         return [self.label]
+
+    def footings(self, tree: Tree) -> Mapping[str, Footing]:
+        if tree.frame(self.to).link >= 0:
+            return {}
+        return {self.label: Footing(self.touching_pairs(tree)[0].b, np.array(self.velocity))}
 
     def touching_pairs(self, tree: Tree) -> Sequence[TouchingPair]:
         b = _surface(tree, self.part, self.shape, self.size, self.position, self.orientation, "")

@@ -1,6 +1,6 @@
 """The contract of an effect: something that acts on the body, compiled into the step only where a scene names it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from physics_prior import rotations
 from physics_prior.effects.anchor_motion import AnchorMotion
-from physics_prior.effects.touching import JointRange, TouchingPair
+from physics_prior.effects.touching import Footing, JointRange, TouchingPair
 from physics_prior.errors import ModelError
 from physics_prior.model import JointKind, Link, Tree
 
@@ -147,6 +147,10 @@ class Effect(BaseModel):
     def touching_pairs(self, tree: Tree) -> Sequence[TouchingPair]:
         """Surfaces that it keeps apart: inequality rows."""
         return ()
+
+    def footings(self, tree: Tree) -> Mapping[str, Footing]:
+        """Of its published forces those that the ground, fixed on the world, exerts: name -> what stands on it."""
+        return {}
 
     def reactions(self, tree: Tree) -> Sequence[str]:
         """Names of the forces that it publishes: its label where it holds something, unless it says otherwise."""

@@ -44,6 +44,30 @@ class Surface:
     position: np.ndarray
     orientation: np.ndarray
 
+    @property
+    def halves(self) -> np.ndarray:
+        """(3,) m, half the edges of the box about it, along its own axes."""
+        if self.kind == "plane":
+            return np.array([np.inf, np.inf, 0.0])
+        if self.kind == "sphere":
+            return np.full(3, self.size[0])
+        if self.kind == "capsule":
+            return np.array([self.size[0], self.size[0], self.size[0] + self.size[1]])
+        return self.size.copy()
+
+
+@dataclass(frozen=True)
+class Footing:
+    """What may stand on the ground.
+
+    Attributes:
+        surface: what touches it.
+        velocity: (3,) m/s, world axes, of the ground's material (a treadmill's belt).
+    """
+
+    surface: Surface
+    velocity: np.ndarray
+
 
 @dataclass(frozen=True)
 class TouchingPair:

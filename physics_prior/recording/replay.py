@@ -5,7 +5,7 @@ estimate is carried on at the rate at which the node would publish it.
 """
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,17 +15,17 @@ import numpy as np
 from scipy.stats import chi2
 
 from physics_prior.errors import RecordingError
-from physics_prior.estimation.estimate import Counts, Health, Level
+from physics_prior.estimation.estimate import Counts, Estimate, Health, Level
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.estimation.filter import Posterior
+from physics_prior.estimation.force_score import Comparison, ForceScore
 from physics_prior.estimation.history import Node
 from physics_prior.estimation.readout import deviations, evaluate, measured_acceleration, unit
-from physics_prior.estimation.score import FROM_SECONDS, Reference, Score
+from physics_prior.estimation.score import FROM_SECONDS, Score
 from physics_prior.estimation.smoother import smooth as smooth_nodes
 from physics_prior.interface import Output, take_in
-from physics_prior.recording.cdr import decode
-from physics_prior.recording.messages import JointState
 from physics_prior.recording.reader import BagReader, open_bag
+from physics_prior.recording.references import read_references
 from physics_prior.recording.writer import BagWriter
 from physics_prior.scene import Scene
 
@@ -51,7 +51,8 @@ class ReplayResult:
         nis_stamps, nis, nis_dimension: (n,) seconds and innovations of each measurement that was used or gated.
         gated, topics: (n,) whether the gate refused it, and where it came from.
         counts: what became of the measurements; loss: what a damaged bag lost, or None.
-        score: errors against the reference (Score.summary), or None.
+        score: errors against the references (Score.summary, and ``forces`` by Comparison.figures), or None.
+        forces: what the ground does against force plates, by name (ForceScore).
         span_s, wall_s, health_s: seconds of the recording, of the replay, and in each health.
     """
 
@@ -72,7 +73,8 @@ class ReplayResult:
     nis_dimension: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     gated: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
     topics: list[str] = field(default_factory=list)
-    score: dict[str, float | None] | None = None
+    score: dict[str, Any] | None = None
+    forces: dict[str, Comparison] = field(default_factory=dict)
     span_s: float = 0.0
     wall_s: float = 0.0
     health_s: dict[str, float] = field(default_factory=dict)
@@ -101,22 +103,22 @@ def replay(
     out: Path | None = None,
     smooth: bool = False,
     process: str = "physics",
-    reference: str | None = None,
+    references: Sequence[str] = (),
     publish_rate: float = 30.0,
     until: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> ReplayResult:
     """Run a recording through a scene's estimator.
 
-    out: a bag to write, with the topics of the node. smooth: estimate each stamp from the whole recording. reference: a
-    JointState topic to score against. publish_rate: Hz, of predictions where nothing is measured. until: s after the bag's
-    first measurement, where to stop. progress: told the share that is done.
+    out: a bag to write, with the topics of the node. smooth: estimate each stamp from the whole recording. references: topics
+    to score against, a JointState and WrenchStamped ones of force plates. publish_rate: Hz, of predictions where nothing is
+    measured. until: s after the bag's first measurement, where to stop. progress: told the share that is done.
 
     Raises:
         RecordingError: the bag, a topic or the output is not usable; nothing is left half-written.
         SimulationError: the scene's motion cannot be computed.
     """
-    return _Replay(bag, scene, smooth, process, reference, publish_rate, until).run(out, progress)
+    return _Replay(bag, scene, smooth, process, references, publish_rate, until).run(out, progress)
 
 
 class _Replay:
@@ -128,7 +130,7 @@ class _Replay:
         scene: Scene,
         smoothed: bool,
         process: str,
-        reference: str | None,
+        references: Sequence[str],
         publish_rate: float,
         until: float | None,
     ) -> None:
@@ -136,11 +138,12 @@ class _Replay:
         self.until = FOREVER if until is None else until
         self.scene, self.smoothed, self.period = scene, smoothed, 1.0 / publish_rate
         self.sources = _sources(self.reader, scene)
-        self.reference = _read_reference(self.reader, reference) if reference is not None else None
+        self.reference, plates = read_references(self.reader, references, scene)
         self.estimator = Estimator(scene, process, FOREVER if smoothed else HISTORY_SECONDS)
         self.estimator.on_settled = self._settle
         self.simulator, self.process = self.estimator.simulator, self.estimator.filter.process
         self.score = Score(scene, self.simulator, self.reference.names) if self.reference is not None else None
+        self.force_score = ForceScore(scene, self.simulator, plates) if plates else None
         self.result = ReplayResult(scene, smoothed, loss=self.reader.loss)
         self.settled: list[Node] = []
         self.rows: list[tuple[int, int, dict[str, np.ndarray], dict[str, np.ndarray]]] = []
@@ -212,14 +215,19 @@ class _Replay:
         values = evaluate(self.scene.readouts, self.simulator, state.q, state.v, vdot)
         spread = deviations(self.scene.readouts, self.simulator, self.process, posterior)
         self.rows.append((posterior.stamp, int(health.level), values, spread))
-        self._compare(posterior, vdot)
+        settled = posterior.stamp - self.first_stamp >= FROM_SECONDS * NANOSECONDS
+        if settled:
+            self._compare(posterior, vdot)
+        if self.writer is None and not (settled and self.force_score):
+            return
+        estimate = self.estimator.describe(posterior)
+        if settled and self.force_score is not None:
+            self.force_score.add(estimate.stamp, estimate.q, estimate.v, estimate.wrenches)
         if self.writer is not None:
-            self._file(posterior, log_time, health)
+            self._file(estimate, log_time, health)
 
     def _compare(self, posterior: Posterior, vdot: np.ndarray | None) -> None:
-        if self.reference is None or self.score is None or self.first_stamp is None:
-            return
-        if posterior.stamp - self.first_stamp < FROM_SECONDS * NANOSECONDS:
+        if self.reference is None or self.score is None:
             return
         at = self.reference.at(posterior.stamp)
         if at is not None:
@@ -230,17 +238,16 @@ class _Replay:
             if true is not None:
                 self.true.append((posterior.stamp, true))
 
-    def _file(self, posterior: Posterior, log_time: int, health: Health) -> None:
+    def _file(self, estimate: Estimate, log_time: int, health: Health) -> None:
         """Write what the node would: states each time, pictures and diagnostics at their pace, these also when effects change."""
         assert self.writer is not None
-        estimate = self.estimator.describe(posterior)
         publications = self.output.states(estimate)
         if log_time >= self.next_markers:
             publications += self.output.markers(estimate)
             self.next_markers = log_time + round(MARKER_PERIOD * NANOSECONDS)
         active = self.output.active_effects(estimate)
         if log_time >= self.next_diagnostics or active != self.active:
-            publications += self.output.diagnostics(posterior.stamp, health, self.estimator.counts, estimate)
+            publications += self.output.diagnostics(estimate.stamp, health, self.estimator.counts, estimate)
             self.next_diagnostics = log_time + round(DIAGNOSTICS_PERIOD * NANOSECONDS)
             self.active = active
         for topic, message in publications:
@@ -293,6 +300,10 @@ class _Replay:
                     readout.name: self.reference.positions[:, self.reference.names.index(readout.name)]
                     for readout in self.score.compared
                 }
+        if self.force_score is not None:
+            result.forces = self.force_score.comparisons()
+            figures = {name: each.figures(self.force_score.weight) for name, each in result.forces.items()}
+            result.score = {"from_s": FROM_SECONDS, **(result.score or {}), "forces": figures}
 
 
 def _sources(reader: BagReader, scene: Scene) -> dict[str, Any]:
@@ -302,27 +313,6 @@ def _sources(reader: BagReader, scene: Scene) -> dict[str, Any]:
     for source in scene.measurements:
         reader.require_topic(source.topic, *source.message_types)
     return {source.topic: source for source in scene.measurements}
-
-
-def _read_reference(reader: BagReader, topic: str) -> Reference:
-    """A JointState topic as a reference; velocities that are missing are NaN."""
-    reader.require_topic(topic, JointState.ros_type)
-    stamps, positions, velocities = [], [], []
-    names: tuple[str, ...] = ()
-    for record in reader.read([topic]):
-        message = decode(record.message_type, record.data)
-        assert isinstance(message, JointState)
-        names = names or tuple(message.name)
-        position, velocity = np.array(message.position), np.array(message.velocity)
-        if tuple(message.name) != names or len(position) != len(names) or len(velocity) not in (0, len(names)):
-            raise RecordingError(
-                f"{reader.path}: reference {topic} does not hold one position (and velocity) for each of {list(names)}"
-            )
-        stamps.append(message.header.stamp.sec * 10**9 + message.header.stamp.nanosec)
-        positions.append(position)
-        velocities.append(velocity if len(velocity) else np.full(len(names), np.nan))
-    order = np.argsort(stamps, kind="stable")
-    return Reference(np.array(stamps)[order], names, np.array(positions)[order], np.array(velocities)[order])
 
 
 def _absolute(topic: str) -> str:

@@ -99,7 +99,7 @@ def _timed(scene: Scene, variant: Variant, stamps: Sequence[Sequence[Measurement
     return estimator, float(np.median(times))
 
 
-def run_recording(bag: Path, scene: Scene, reference: str | None, progress: Callable[[float], None]) -> list[Point]:
+def run_recording(bag: Path, scene: Scene, reference: str, progress: Callable[[float], None]) -> list[Point]:
     """Replay a recording by every step, and without physics, against a JointState topic.
 
     Raises:
@@ -108,7 +108,7 @@ def run_recording(bag: Path, scene: Scene, reference: str | None, progress: Call
     out, stamps = [], _measured(bag, scene)
     variants = [*STEPS, Variant(process="kinematic")]
     for done, variant in enumerate(variants):
-        figures = replay(bag, variant.of(scene), process=variant.process, reference=reference).summary()
+        figures = replay(bag, variant.of(scene), process=variant.process, references=[reference]).summary()
         _, us = _timed(scene, variant, stamps)
         score, nis = figures["reference"] or {}, figures["nis"]
         angles, forces = (_number(score.get(key)) for key in ("position_rmse_deg", "force_rmse_percent_weight"))

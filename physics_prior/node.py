@@ -32,12 +32,14 @@ from physics_prior.estimation.estimate import Estimate, Health, Level
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.interface import Output, take_in
 from physics_prior.interface.output import Publication
+from physics_prior.interface.pace import Pace
 from physics_prior.interface.topics import MARKERS, switch_services
 from physics_prior.interface.warm_up import warm_up
 from physics_prior.recording.cdr import encode
 from physics_prior.ros_inputs import Input, ros_class
 from physics_prior.ros_parameters import AUTOSTART, declare, require_scene, why_refused
 from physics_prior.scene import MeasurementSource, load_scene
+from physics_prior.stepping import settle
 
 IMPORTED = time.monotonic()
 FOLLOW_PERIOD = 0.2  # s, at which publishers are looked at
@@ -64,6 +66,7 @@ class PhysicsPriorNode(LifecycleNode):
         self._rate_timers: list[Any] = []
         self._offered: list[Any] = []  # services; `_services` is rclpy's own
         self._lost_before = 0
+        self._pace = Pace(None)
         self._forget()
         self.add_on_set_parameters_callback(self._judge_parameters)
         declare(self)
@@ -130,6 +133,10 @@ class PhysicsPriorNode(LifecycleNode):
         self.get_logger().info(
             f"preparing scene '{scene.name}': half a minute where it was never compiled, else a second"
         )
+        scene, choice = settle(scene, self.get_logger().info)
+        self._pace = Pace(None if choice is None else choice.asked)
+        if choice is not None:
+            self.get_logger().info(f"step chosen: {choice.taken.scheme}, {1e3 * choice.taken.step.size:g} ms")
         scene = replace(scene, frame_id=self._value("frame_id") or scene.frame_id)
         warm_up(scene)
         self._estimator = Estimator(scene, history_length=self._value("history_length"))
@@ -237,7 +244,9 @@ class PhysicsPriorNode(LifecycleNode):
         estimator = self._estimator
         assert estimator is not None
         stamp, rejection = estimator.stamp, estimator.last_rejection
+        begin = time.thread_time()
         changed = take_in(estimator, source, type_name, data)
+        self._pace.add(estimator.stamp, time.thread_time() - begin)
         if estimator.last_rejection != rejection:
             self.get_logger().warning(estimator.last_rejection, throttle_duration_sec=5.0)
         if changed:
@@ -316,6 +325,9 @@ class PhysicsPriorNode(LifecycleNode):
             problems.append(
                 f"{lost - self._lost_before} measurements were lost: they come faster than they are taken in"
             )
+        slow, pace = self._pace.tell()
+        if slow:
+            problems.append(slow)
         if problems:
             causes = "; ".join([*problems, health.cause] if health.cause else problems)
             health = Health(max(health.level, Level.DEGRADED), causes)
@@ -323,6 +335,7 @@ class PhysicsPriorNode(LifecycleNode):
             "measurements lost": lost,
             "longest wait ms": f"{1e3 * max((each.longest_wait for each in self._inputs), default=0.0):.1f}",
             "last rejection": self._estimator.last_rejection,
+            **pace,
         }
         self._lost_before = lost
         for each in self._inputs:

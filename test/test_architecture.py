@@ -27,6 +27,7 @@ ROOMS = [
     ("estimation",),
     ("interface",),
     ("recording.simulate", "recording.truth", "recording.references", "recording.replay", "interface.warm_up"),
+    ("stepping",),
     ("calibration",),
     ("studies",),
     ("commands", "ros_inputs", "ros_parameters"),

@@ -4,6 +4,8 @@ Prints the parts and joints of the model, the effects and why each is on, constr
 state, what is measured, read out and published, and what one step costs on this machine. Only the effects that are listed
 are compiled into the step; --show-step prints its source.
 
+Of a scene that asks for an accuracy it tells which step was chosen for it, and what others would err and cost.
+
 --cost tells what each effect adds to a step: the step with it and without it, from the scene's start, in turns. The steps
 without one are compiled once, some 10 s each; that is why it has to be asked for.
 
@@ -30,11 +32,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Explain the scene; 0."""
     require_folder("--json", args.json)
+    from physics_prior.commands.compilation import load_settled
     from physics_prior.commands.explanation import explain, scene_figures, step_text
-    from physics_prior.scene import load_scene
     from physics_prior.studies.effects.cost import effect_costs
 
-    scene = load_scene(args.scene)
+    scene, choice = load_settled(args.scene)
     if args.show_step:
         print(step_text(scene), end="")
         return 0
@@ -42,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     if args.cost:
         with progress("timing") as report:
             costs = effect_costs(scene, report)
-    figures = scene_figures(scene, costs)
+    figures = scene_figures(scene, costs, choice)
     if args.json is not None:
         write_json(args.json, figures)
     if args.json != STDOUT:

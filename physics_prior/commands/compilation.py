@@ -2,14 +2,26 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Literal
 
-from physics_prior.commands.terminal import status
+from physics_prior.commands.terminal import progress, status
 from physics_prior.dynamics.compose import kinds_of_rows, step_module
 from physics_prior.dynamics.kernel import cache_directory
-from physics_prior.scene import Scene
+from physics_prior.scene import Scene, load_scene
+from physics_prior.stepping import Choice, settle
 
 DURATION, WITH_CONTACT = "~15 s", "~40 s"
+
+
+def load_settled(name_or_path: str | Path) -> tuple[Scene, Choice | None]:
+    """A scene with its step, chosen for the accuracy that it asks for if it does: then also the choice.
+
+    Raises:
+        SceneError: as of ``load_scene`` and ``settle``.
+    """
+    with progress("loading") as report:
+        return settle(load_scene(name_or_path), lambda what: report(0.0, what))
 
 
 @contextmanager

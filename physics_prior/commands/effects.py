@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     """Study the effects; 0."""
     require_folder("--json", args.json)
     require_folder("--plot", None if args.plot is None else str(args.plot))
-    from physics_prior.commands.compilation import compiling
+    from physics_prior.commands.compilation import compiling, load_settled
     from physics_prior.interface.warm_up import warm_up
     from physics_prior.studies.effects.ablation import ablate
     from physics_prior.studies.effects.drawing import draw
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
         require_format(args.plot)
     if args.reference is not None and not args.bags:
         raise PhysicsPriorError("--reference needs a BAG that holds the topic: a simulated motion has none")
-    text = SceneText.read(args.scene)
+    text = SceneText.read(args.scene).stepped(load_settled(args.scene)[0].step)
     proposed = [_entry(each) for each in args.proposed]
     scene = text.build()
     if not scene.measurements:

@@ -29,6 +29,7 @@ from physics_prior.scene import (
     Scene,
     SwitchSource,
 )
+from physics_prior.stepping import Choice
 
 MOST_POINTS = {"sphere": 1, "ellipsoid": 1, "capsule": 2, "box": SLOTS, "plane": SLOTS}
 """At how many points a surface can touch another."""
@@ -40,16 +41,18 @@ def explain(scene: Scene, figures: dict[str, Any]) -> None:
     out = console()
     out.print(scene.name, style="bold")
     out.print(scene.description)
-    parts = (_model(scene), _effects(figures), _measurements(scene), _readouts(scene), _state(scene, figures))
+    parts = [_model(scene), _effects(figures), _measurements(scene), _readouts(scene), _state(scene, figures)]
+    if figures["accuracy"] is not None:
+        parts.append(_accuracy(figures["accuracy"]))
     for part in parts:
         out.print()
         out.print(part)
 
 
-def scene_figures(scene: Scene, costs: Sequence[float] | None = None) -> dict[str, Any]:
+def scene_figures(scene: Scene, costs: Sequence[float] | None = None, choice: Choice | None = None) -> dict[str, Any]:
     """The figures of a scene, for JSON: ``effects`` in their order, ``state`` and ``step``; compiles its step if it is not yet.
 
-    costs: what each effect adds to a step, us, where that was measured.
+    costs: what each effect adds to a step, us, where that was measured; choice: of the step, where it was chosen.
     """
     with compiling(scene, "carry"):
         simulator = scene.simulator()
@@ -78,6 +81,7 @@ def scene_figures(scene: Scene, costs: Sequence[float] | None = None) -> dict[st
             "us": step,
             "us_with_derivatives": with_derivatives,
         },
+        "accuracy": None if choice is None else choice.model_dump(exclude_unset=True),
     }
 
 
@@ -198,6 +202,28 @@ def _state(scene: Scene, figures: dict[str, Any]) -> Table:
         "cost of a step", f"{step['us']:.3g} us here; with its derivatives {step['us_with_derivatives']:.3g} us"
     )
     out.add_row("faster than real time", f"{step['size'] / step['us'] * 1e6:,.0f}x, one core")
+    return out
+
+
+def _accuracy(choice: dict[str, Any]) -> Table:
+    """What was asked of the step, what was taken, and what else there was."""
+    ((asked, value),) = choice["asked"].items()
+    wanted = {
+        "tolerance": f"an error of at most {value:g} m",
+        "budget": f"at most {1e6 * value:g} us from measurement to measurement",
+        "real_time_factor": f"{value:g}x real time",
+    }[asked]
+    cost = f"us {choice['work']}, a measurement"
+    title = f"accuracy: {wanted}" + ("" if choice["kept"] else "; NO STEP KEEPS IT, this is the cheapest")
+    out = table(title, "", "integrator", "step", "tolerance", "error [m]", cost, numbers=4)
+    for mark, each in [("taken", choice["taken"]), *(("", other) for other in choice["others"])]:
+        step = each["step"]
+        tolerance = f"{step['tolerance']:g}" if "tolerance" in step else ""
+        size = f"{1e3 * step['size']:.4g} ms"
+        out.add_row(mark, each["scheme"], size, tolerance, f"{each['error']:.2g}", f"{each['us']:.3g}")
+    span, known = choice["seconds"], choice["reference"]
+    out.caption = f"errors over {span:g} s from the initial state, against a motion known to {known:.1g} m"
+    out.caption_justify = "left"
     return out
 
 

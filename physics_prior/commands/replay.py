@@ -47,17 +47,16 @@ def run(args: argparse.Namespace) -> int:
     """Replay the bag; 0."""
     require_folder("--json", args.json)
     require_folder("--plot", args.plot)
-    from physics_prior.commands.compilation import compiling
+    from physics_prior.commands.compilation import compiling, load_settled
     from physics_prior.commands.replay_report import print_report
     from physics_prior.interface.warm_up import warm_up
     from physics_prior.recording.replay import replay
-    from physics_prior.scene import load_scene
 
     if args.plot is not None:
         from physics_prior.studies.plot import plot_replay, require_format
 
         require_format(Path(args.plot))
-    scene = load_scene(args.scene)
+    scene, _ = load_settled(args.scene)
     with compiling(scene, "carry"):
         warm_up(scene)
     with progress(f"replaying {args.bag.name}") as report:

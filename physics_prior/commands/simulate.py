@@ -26,11 +26,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record the bag; 0."""
-    from physics_prior.commands.compilation import compiling
+    from physics_prior.commands.compilation import compiling, load_settled
     from physics_prior.recording.simulate import simulate
-    from physics_prior.scene import load_scene
 
-    scene = load_scene(args.scene)
+    scene, _ = load_settled(args.scene)
     with compiling(scene, "advance"):
         simulator = scene.simulator()
         simulator.advance(scene.initial.q.copy(), scene.initial.v.copy(), scene.step.size)

@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     require_folder("--json", args.json)
     if (args.bag is None) != (args.scene is None) or (args.bag is None) != (args.reference is None):
         raise PhysicsPriorError("a recording needs --bag, --scene and --reference together: give all three or none")
-    from physics_prior.scene import load_scene
+    from physics_prior.commands.compilation import load_settled
     from physics_prior.studies.estimator.study import card, run_recording, run_study, table
 
     if args.plot is not None:
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
         require_format(args.plot)
     with progress("estimating") as report:
         if args.bag is not None:
-            points = run_recording(args.bag, load_scene(args.scene), args.reference, report)
+            points = run_recording(args.bag, load_settled(args.scene)[0], args.reference, report)
         else:
             points = run_study(args.problems, args.seed, report)
     if args.plot is not None:

@@ -20,9 +20,10 @@ from physics_prior.scene.readouts import (
     Readout,
 )
 from physics_prior.scene.scene import Initial, Noise, Scene
-from physics_prior.scene.schema import Gate, Health, Pose, Simulation, Step
+from physics_prior.scene.schema import Accuracy, Gate, Health, Pose, Simulation, Step
 
 __all__ = [
+    "Accuracy",
     "AngleReadout",
     "EnergyReadout",
     "ForceReadout",

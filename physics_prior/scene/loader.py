@@ -42,8 +42,11 @@ def build_scene(top: Place) -> Scene:
     file = validate(SceneFile, top)
     tree = build_tree(top["model"])
     effects = _read_effects(top.get("effects"), tree)
-    if file.step.sleep is not None and not kinds_of_rows(tree, effects)[1]:
+    touching = kinds_of_rows(tree, effects)[1]
+    if file.step.sleep is not None and not touching:
         raise top["step"]["sleep"].error("is not valid where nothing may touch: name a contact or a joint_limit")
+    if file.accuracy is not None:
+        _check_accuracy(top, touching)
     measurements = _read_measurements(top.get("measurements"), tree, effects)
     if measurements and file.noise is None:
         raise top.error("'noise' is missing: say how far to trust the model, for example 'noise: {force: 1e-3}'")
@@ -62,7 +65,19 @@ def build_scene(top: Place) -> Scene:
         step=file.step,
         initial=read_initial(top.get("initial"), tree),
         simulation=file.simulation,
+        accuracy=file.accuracy,
     )
+
+
+def _check_accuracy(top: Place, touching: bool) -> None:
+    """Refuse an accuracy beside a step, or where it cannot be measured."""
+    if "step" in top.value and top["step"].value is not None:
+        raise top["step"].error("is not valid beside 'accuracy', which chooses the step: give one of them")
+    if touching:
+        raise top["accuracy"].error(
+            "is not valid where something may touch: the error of a motion with impacts does not fall with the step as"
+            " that of a smooth one, so none can be promised; give 'step' instead"
+        )
 
 
 def _read_effects(place: Place, tree: Tree) -> tuple[Effect, ...]:

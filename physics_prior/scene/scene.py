@@ -8,10 +8,11 @@ import numpy as np
 from physics_prior.dynamics.contact.memory import Sleep
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects import Effect
+from physics_prior.errors import SceneError
 from physics_prior.model import Tree
 from physics_prior.scene.measurements import MeasurementSource
 from physics_prior.scene.readouts import Readout
-from physics_prior.scene.schema import Gate, Health, Simulation, Step
+from physics_prior.scene.schema import Accuracy, Gate, Health, Simulation, Step
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +58,7 @@ class Scene:
         step: time stepping.
         initial: start of the simulation.
         simulation: what ``simulate`` records.
+        accuracy: what is asked of the step where none is given: ``stepping.settle`` finds one.
     """
 
     name: str
@@ -73,9 +75,16 @@ class Scene:
     step: Step
     initial: Initial
     simulation: Simulation
+    accuracy: Accuracy | None = None
 
     def simulator(self, sleeping: bool = True) -> Simulator:
-        """The scene's own compiled step; islands at rest sleep if the scene says so and ``sleeping`` does not forbid it."""
+        """The scene's own compiled step; islands at rest sleep if the scene says so and ``sleeping`` does not forbid it.
+
+        Raises:
+            SceneError: the scene asks for an accuracy, and no step has been chosen for it.
+        """
+        if self.accuracy is not None:
+            raise SceneError(f"scene '{self.name}' asks for an accuracy: its step is not chosen yet")
         step, sleep = self.step, None
         if sleeping and step.sleep is not None:
             sleep = Sleep(step.sleep.velocity, step.sleep.duration)

@@ -4,7 +4,7 @@ import re
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, JsonValue, PlainValidator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, JsonValue, PlainValidator, model_validator
 
 from physics_prior import rotations
 from physics_prior.dynamics.integrators import DEFAULT, INTEGRATORS, TOLERATED, IntegratorName
@@ -66,6 +66,11 @@ def parse_orientation(value: Any) -> tuple[float, float, float, float]:
             ) from None
     w, x, y, z = q.tolist()
     return w, x, y, z
+
+
+def _per_step(value: Any) -> Any:
+    """A budget of time, '50 us per step', as the time that it is."""
+    return re.sub(r"\s+per\s+step\s*$", "", value) if isinstance(value, str) else value
 
 
 def _numbers(value: Any, count: int) -> np.ndarray | None:
@@ -189,6 +194,20 @@ class Step(Section):
         return self
 
 
+class Accuracy(Section):
+    """What is asked in place of a step: an error, m, or a cost, s of the processor per measurement or times real time."""
+
+    tolerance: PositiveLength | None = None
+    budget: Annotated[PositiveTime, BeforeValidator(_per_step)] | None = None
+    real_time_factor: Annotated[Number, Field(gt=0.0)] | None = None
+
+    @model_validator(mode="after")
+    def _check_one(self) -> "Accuracy":
+        if sum(each is not None for each in (self.tolerance, self.budget, self.real_time_factor)) != 1:
+            raise ValueError("give one of 'tolerance', 'budget' and 'real_time_factor'")
+        return self
+
+
 class Gate(Section):
     """Which measurements are believed: those inside the chi-square region of this probability.
 
@@ -259,5 +278,6 @@ class SceneFile(Section):
     gate: Gate = Gate()
     health: Health = Health()
     step: Step = Step()
+    accuracy: Accuracy | None = None
     initial: InitialSection = InitialSection()
     simulation: Simulation = Simulation()

@@ -23,7 +23,8 @@ from physics_prior.recording.cdr import decode, encode
 from physics_prior.recording.messages import Header
 from physics_prior.recording.messages import PoseStamped as OurPose
 from physics_prior.recording.simulate import message_of, motion
-from physics_prior.scene import load_scene
+from physics_prior.scene import Accuracy, load_scene
+from physics_prior.stepping import Choice, Measured
 
 TOPICS = ("/link1/pose", "/link2/pose")
 
@@ -212,6 +213,27 @@ def test_lost_measurements_are_counted(graph, measured, scene):
 
 
 # When -------------------------------------------------------------------------------------------------------------------
+
+
+def test_a_budget_that_does_not_hold_is_said(graph, send, measured, monkeypatch):
+    asked = Accuracy(budget=1e-9)
+
+    def settled(scene, report):
+        taken = Measured(scheme="rk4", step=scene.step, error=1e-6, us=50.0)
+        told = {"work": "estimating", "interval": 0.01, "seconds": 1.0, "reference": 0.0, "kept": False}
+        return scene, Choice(asked=asked, taken=taken, others=(), **told)
+
+    monkeypatch.setattr("physics_prior.node.settle", settled)
+    node = graph.node(diagnostics_rate=2.0)
+    diagnostics = graph.collect(DiagnosticArray, "/diagnostics")
+    send(node, measured)
+    said = "us each: the scene's budget is 0.001 us"
+    graph.until(lambda: any(said in array.status[0].message for array in diagnostics), "the budget to be missed")
+    late = next(array.status[0] for array in diagnostics if said in array.status[0].message)
+    assert late.level == b"\x01"
+    values = {value.key: value.value for value in late.values}
+    assert float(values["us a measurement"]) > 0.0
+    assert float(values["real time factor"]) > 0.0
 
 
 def test_without_measurements_the_state_is_predicted_until_it_is_lost(graph, clock, scene, measured, send):

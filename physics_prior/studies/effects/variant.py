@@ -10,7 +10,7 @@ from typing import Any
 
 from physics_prior.errors import SceneError
 from physics_prior.resources import scene_path
-from physics_prior.scene import Scene, build_scene
+from physics_prior.scene import Scene, Step, build_scene
 from physics_prior.scene.yaml_file import parse_yaml, read_yaml, shown
 
 _NUMBER = re.compile(r"\s*([-+]?(?:\.\d+|\d+\.?\d*)(?:[eE][-+]?\d+)?)(\s.*)?", re.ASCII | re.DOTALL)
@@ -39,6 +39,13 @@ class SceneText:
     def build(self) -> Scene:
         """The scene; SceneError as of a file, its lines those of the variant."""
         return build_scene(parse_yaml(self.path, json.dumps(self.data, indent=1)))
+
+    def stepped(self, step: Step) -> "SceneText":
+        """The scene with the step that was chosen for it, if it asks for an accuracy: what variants of it are compared at."""
+        if self.data.get("accuracy") is None:
+            return self
+        data = {key: value for key, value in self.data.items() if key != "accuracy"}
+        return SceneText(self.path, data | {"step": step.model_dump(exclude_unset=True)})
 
     @property
     def entries(self) -> list[Any]:

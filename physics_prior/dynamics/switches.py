@@ -9,6 +9,7 @@ import numpy as np
 from physics_prior import rotations
 from physics_prior.dynamics.anchor_motion import displaced_anchor
 from physics_prior.dynamics.assembly import ASSEMBLED, assemble, turned_over
+from physics_prior.dynamics.conditioning import unlike
 from physics_prior.dynamics.records import pair_records
 from physics_prior.dynamics.wrench import Wrench
 from physics_prior.effects.holding import Holding
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from physics_prior.dynamics.simulator import Simulator
 
 GAIN = 1e-6  # of the kinetic energy: what rounding may add as something takes hold
-UNLIKE = "the masses or inertias that it joins are too unlike for its impulse to be told from rounding"
+UNLIKE = "the masses or inertias that it joins are too unlike for its force to be told from rounding"
 MOVED = 1e-12  # m or rad: below it, taking hold has not moved the body
 
 
@@ -188,6 +189,7 @@ class Switches:
         if not (np.isfinite(q).all() and np.isfinite(v).all()):
             raise SimulationError(f"{self.furthest()} cannot take hold: {UNLIKE}")
         if not left <= ASSEMBLED:
+            self._require_alike(before)
             raise SimulationError(
                 f"{self.furthest()} cannot take hold: {left:.3g} m stay between the points that it joins"
             )
@@ -196,6 +198,7 @@ class Switches:
                 f"'{self.labels[index]}' cannot take hold: its part is held by others half a turn away"
             )
         impulses = self._impulses()
+        self._require_alike(q)
         moved = float(np.max(np.abs(simulator.tree.difference(before, q)), initial=0.0))
         after = _kinetic_energy(simulator, q, v)
         if not np.any(simulator.memory.pairs["motion"]):
@@ -205,6 +208,12 @@ class Switches:
             if moved > MOVED and after > energy:
                 v *= np.sqrt(energy / after)
         return impulses
+
+    def _require_alike(self, q: np.ndarray) -> None:
+        """Raise SimulationError if at q the masses lose a direction that what holds has as levers."""
+        index = unlike(self._simulator, q)
+        if index is not None:
+            raise SimulationError(f"'{self.labels[index]}' cannot take hold: {UNLIKE}")
 
     def _here(self, index: int) -> bool:
         effect = self.effects[index]

@@ -7,7 +7,7 @@ from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects.attachment import Attachment, Rod
 from physics_prior.effects.gravity import Gravity
 from physics_prior.errors import ModelError, SimulationError
-from physics_prior.inertia import point_mass, rod
+from physics_prior.inertia import MassProperties, point_mass, rod
 from physics_prior.model import Joint, JointKind, Part, Tree
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -155,3 +155,37 @@ def test_a_light_link_held_elsewhere_leaves_a_loop_alone(mass, hung):
     assert rank == 4
     # hung where the loop is held, they weigh on no link of it
     assert np.max(np.abs(found - expected)) < 1e-12  # measured 6e-15
+
+
+@pytest.mark.parametrize("lever", [(3.0, 0.0, 0.0), (0.3, 0.2, 0.1), (0.0, 0.0, -1.0)])
+def test_a_body_that_turns_far_more_easily_than_it_comes_along_is_refused(lever):
+    """1 kg of 1e-12 kg m^2, held off its centre: "1.21 m stay" was said of points that were together, or a step came open."""
+    body = MassProperties(1.0, np.zeros(3), 1e-12 * np.diag([1.0, 0.9, 1.2]))
+    tree = Tree([Part("body", body)], [Joint("float", JointKind.FREE, "world", "body")])
+    simulator = Simulator(tree, [Gravity(), Attachment(name="hold", part="body", point=lever, at=lever)])
+    with pytest.raises(SimulationError, match="'hold' cannot take hold: the masses .* too unlike"):
+        simulator.begin(tree.neutral(), np.zeros(6))
+
+
+@pytest.mark.parametrize(("ratio", "sound"), [(1e-5, True), (1e-9, False), (1e-12, False)])
+def test_what_is_tied_to_a_light_link_that_is_held_is_refused_where_rounding_parts_them(ratio, sound):
+    """No pair of rows alone shows it: the tie gives way as its light link does, which is held by the pin."""
+    light = rod(ratio, 1.0).transformed(np.eye(3), 0.5 * DOWN)
+    joints = [
+        Joint("heavy_joint", JointKind.REVOLUTE, "world", "heavy", axis=Y),
+        Joint("light_joint", JointKind.REVOLUTE, "world", "light", np.array([1.0, 0.0, 0.0]), axis=Y),
+    ]
+    tree = Tree([Part("heavy", HANGING), Part("light", light)], joints)
+    below = {"point": (0.0, 0.0, -1.0)}
+    holds = [
+        Attachment(name="tie", part="heavy", to="light", at=(-1.0, 0.0, -1.0), **below),
+        Attachment(name="pin", part="light", at=(1.0, 0.0, -1.0), **below),
+    ]
+    simulator, q, v = Simulator(tree, [Gravity(), *holds]), np.zeros(2), np.zeros(2)
+    if not sound:
+        with pytest.raises(SimulationError, match="'tie' cannot take hold: the masses .* too unlike"):
+            simulator.begin(q, v)
+        return
+    simulator.begin(q, v)
+    simulator.advance(q, v, 1e-3, 100)
+    assert np.max(np.abs(simulator.constraint_error(q, v))) < 1e-12  # measured 0

@@ -17,7 +17,7 @@ HOLDS = 0.03  # of the rows' usual lever: the least singular value of a directio
 
 
 def unlike(simulator: "Simulator", q: np.ndarray) -> int | None:
-    """The first effect, among those that hold something, whose rows lose a direction to the masses at q (nq,); None if all tell."""
+    """The first of the effects that hold something whose rows lose a direction to the masses at q (nq,); None if none does."""
     memory = simulator.memory
     system = (memory.links, memory.work, memory.pairs, memory.rows, memory.known, q)
     rank, levers = constraint.refresh(*system), _levers(simulator)

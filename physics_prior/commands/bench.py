@@ -9,16 +9,21 @@ and run in both: the same bits, the same instructions. Takes some two to three m
 
 With --sleep, boxes at rest beside a pendulum are stepped with sleep and without.
 
+With --chain, chains and rows of four-bars of 10 to 300 links are stepped: cost grows in proportion to bodies. --plot draws it.
+
 Examples:
   physics-prior bench
   physics-prior bench --sleep
   physics-prior bench --effects
+  physics-prior bench --chain --plot docs/chain.png
   physics-prior bench --peers --json bench.json
 """
 
 import argparse
+from pathlib import Path
 
-from physics_prior.commands.terminal import STDOUT, console, progress, require_folder, write_json
+from physics_prior.commands.terminal import STDOUT, console, progress, require_folder, whole_file, write_json
+from physics_prior.errors import PhysicsPriorError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,12 +33,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--effects", action="store_true", help="show that effects cost nothing where they are not named"
     )
     parser.add_argument("--sleep", action="store_true", help="tell what sleep saves where islands rest")
+    parser.add_argument("--chain", action="store_true", help="tell how cost grows with the number of bodies")
+    parser.add_argument("--plot", metavar="FILE", type=Path, help="draw what --chain tells: .png, .svg or .pdf")
     parser.add_argument("--json", metavar="FILE", help="write the figures as JSON; - prints that and nothing else")
 
 
 def run(args: argparse.Namespace) -> int:
     """Time the kernels; 0."""
     require_folder("--json", args.json)
+    if args.chain:
+        return _chain(args)
+    if args.plot is not None:
+        raise PhysicsPriorError("--plot draws what --chain tells: give both")
     if args.effects:
         return _effects(args)
     if args.sleep:
@@ -72,4 +83,23 @@ def _sleep(args: argparse.Namespace) -> int:
         write_json(args.json, figures)
     if args.json != STDOUT:
         console().print(table(figures), soft_wrap=True)
+    return 0
+
+
+def _chain(args: argparse.Namespace) -> int:
+    from physics_prior.studies.chain_costs import card, draw, run_chain_costs, table
+    from physics_prior.studies.plot import require_format
+
+    if args.plot is not None:
+        require_folder("--plot", str(args.plot))
+        require_format(args.plot)
+    with progress("timing") as report:
+        costs = run_chain_costs(progress=report)
+    if args.plot is not None:
+        with whole_file(args.plot) as partial:
+            draw(costs, partial)
+    if args.json is not None:
+        write_json(args.json, card(costs))
+    if args.json != STDOUT:
+        console().print(table(costs), soft_wrap=True)
     return 0

@@ -21,11 +21,11 @@ def run_study(
     with one_core():
         for index, problem in enumerate(problems):
             schemes = own_schemes(problem) + (peer_schemes(problem) if peers else [])
-            report = partial(_part, progress, index, problems)
+            report = partial(part_of, progress, index, problems)
             out[problem.key] = (problem, measure(problem, schemes, report))
     return out
 
 
-def _part(progress: Callable[[float, str], None], index: int, problems: Sequence[Problem], part: float) -> None:
+def part_of(progress: Callable[[float, str], None], index: int, problems: Sequence[Problem], part: float) -> None:
     """Tell how far the whole study is when part of a problem is."""
     progress((index + part) / len(problems), problems[index].key)

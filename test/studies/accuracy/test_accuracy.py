@@ -12,7 +12,7 @@ from physics_prior import cli
 from physics_prior.errors import PhysicsPriorError
 from physics_prior.studies.accuracy import measure as measuring
 from physics_prior.studies.accuracy import problem as problems
-from physics_prior.studies.accuracy import study
+from physics_prior.studies.accuracy import study, trajectory
 from physics_prior.studies.accuracy.compiled import Compiled
 from physics_prior.studies.accuracy.front import front, seconds_to_reach
 from physics_prior.studies.accuracy.measure import Point, measure
@@ -22,6 +22,13 @@ from physics_prior.studies.accuracy.textbook import FORMULATIONS, Textbook
 from physics_prior.studies.accuracy.trajectory import Setting
 
 COARSE = [Setting(0.05), Setting(0.025)]
+
+
+@pytest.fixture(autouse=True)
+def nothing_is_too_slow(monkeypatch):
+    """A busy machine gives up no run."""
+    for module in (measuring, trajectory):
+        monkeypatch.setattr(module, "LONGEST", math.inf)
 
 
 def point(error, seconds, scheme="rk4", engine="compiled"):

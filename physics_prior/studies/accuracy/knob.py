@@ -1,0 +1,138 @@
+"""A tolerance that is asked for, put to the test: what the step chosen for it errs and costs where the motion is known."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from physics_prior import __version__
+from physics_prior.dynamics.integrators import INTEGRATORS
+from physics_prior.dynamics.simulator import Simulator
+from physics_prior.errors import SceneError
+from physics_prior.scene import Step
+from physics_prior.stepping.choice import Measured, cheapest
+from physics_prior.stepping.course import Course
+from physics_prior.stepping.trials import Trials
+from physics_prior.studies.accuracy.compiled import Compiled
+from physics_prior.studies.accuracy.front import seconds_to_reach
+from physics_prior.studies.accuracy.measure import measure
+from physics_prior.studies.accuracy.problem import Problem
+from physics_prior.studies.accuracy.schemes import own_schemes
+from physics_prior.studies.accuracy.study import part_of
+from physics_prior.studies.accuracy.trajectory import Setting
+from physics_prior.studies.bench import machine, one_core
+from physics_prior.studies.problems.mechanism import Benchmark, Run
+
+TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+MOST_ERROR, MOST_COST = 3.0, 2.0  # times what is asked, and times the best on the measured front
+
+
+@dataclass(frozen=True)
+class Turn:
+    """One tolerance on one problem.
+
+    Attributes:
+        problem, tolerance: which; tolerance in the problem's unit.
+        scheme, h: what was chosen; None where it was refused, and ``why``.
+        error: against the reference of other origin, over what was asked.
+        cost: processor time over that of the best on the front of the study, measured in turns; None where the front has none.
+    """
+
+    problem: str
+    tolerance: float
+    scheme: str | None = None
+    h: float | None = None
+    error: float | None = None
+    cost: float | None = None
+    why: str = ""
+
+    @property
+    def kept(self) -> bool:
+        """Whether it is as accurate and as cheap as it has to be."""
+        return self.error is not None and self.error <= MOST_ERROR and (self.cost is None or self.cost <= MOST_COST)
+
+
+def run_knob(problems: Sequence[Problem], progress: Callable[[float, str], None]) -> list[Turn]:
+    """Ask every problem for every tolerance, one problem after the other, on one core."""
+    out: list[Turn] = []
+    with one_core():
+        for index, problem in enumerate(problems):
+            out += turns(problem, partial(part_of, progress, index, problems))
+    return out
+
+
+def turns(problem: Problem, progress: Callable[[float], None] = lambda part: None) -> list[Turn]:
+    """Choose for every tolerance, then measure the choices among the settings of the study."""
+    course = course_of(problem)
+    chosen: dict[float, Measured | str] = {}
+    for index, tolerance in enumerate(TOLERANCES):
+        try:
+            found = Trials(course, tolerance).best(tolerance)
+            chosen[tolerance] = cheapest(found) if found else "no step tried is so exact in good time"
+        except SceneError as problem_told:
+            chosen[tolerance] = str(problem_told)
+        progress(0.5 * (index + 1) / len(TOLERANCES))
+    taken = {tolerance: each for tolerance, each in chosen.items() if isinstance(each, Measured)}
+    study = [scheme for scheme in own_schemes(problem) if scheme.engine == "compiled"]
+    asked = [
+        Compiled(each.step.integrator, [_setting(each.step)], f"{tolerance:g}", "chosen")
+        for tolerance, each in taken.items()
+    ]
+    points = measure(problem, [*study, *asked], lambda part: progress(0.5 + 0.5 * part))
+    found_points = {float(point.scheme): point for point in points if point.engine == "chosen"}
+    front = [point for point in points if point.engine == "compiled"]
+    out = []
+    for tolerance, each in chosen.items():
+        if isinstance(each, str) or tolerance not in found_points:
+            out.append(Turn(problem.key, tolerance, why=each if isinstance(each, str) else "the run was too slow"))
+            continue
+        point, best = found_points[tolerance], seconds_to_reach(front, tolerance)
+        cost = None if best is None else point.seconds / best
+        out.append(Turn(problem.key, tolerance, each.scheme, each.step.size, point.error / tolerance, cost))
+    return out
+
+
+def course_of(problem: Problem) -> Course:
+    """A problem as steps are tried on: its error is that of the study, its longest step the coarsest there."""
+    benchmark: Benchmark = problem.make()
+
+    def observe(simulator: Simulator, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return benchmark.observe(Run(simulator, q, v))
+
+    start = benchmark.q, benchmark.v, benchmark.times, problem.steps[0], observe, benchmark.distance
+    return Course(benchmark.tree, benchmark.effects, *start, benchmark.tau)
+
+
+def _setting(step: Step) -> Setting:
+    return Setting(step.size, step.tolerance if INTEGRATORS[step.integrator].adaptive else None)
+
+
+def knob_card(found: Sequence[Turn]) -> dict[str, Any]:
+    """Every figure, for JSON."""
+    rows = [asdict(turn) | {"kept": turn.kept} for turn in found]
+    return {"version": __version__, "machine": machine(False), "turns": rows}
+
+
+def knob_table(found: Sequence[Turn]) -> Table:
+    """The figures for people; what does not hold is marked."""
+    out = Table(
+        title=f"The tolerance asked for: error over it (at most {MOST_ERROR:g}), cost over the best (at most {MOST_COST:g})",
+        box=None,
+        pad_edge=False,
+    )
+    for name in ("problem", "tolerance", "integrator"):
+        out.add_column(name, header_style="dim")
+    for name in ("step", "error", "cost", ""):
+        out.add_column(name, justify="right", header_style="dim", no_wrap=True)
+    for turn in found:
+        if turn.error is None or turn.h is None:
+            out.add_row(turn.problem, f"{turn.tolerance:g}", f"refused: {turn.why}", "", "", "", "")
+            continue
+        cost = "" if turn.cost is None else f"{turn.cost:.2f}"
+        mark = "" if turn.kept else "*"
+        step = f"{1e3 * turn.h:.4g} ms"
+        out.add_row(turn.problem, f"{turn.tolerance:g}", turn.scheme, step, f"{turn.error:.2f}", cost, mark)
+    return out

@@ -19,6 +19,7 @@ SUMMARY = {
     "nis": {"mean", "expected", "band95"},
     "health": {"OK", "DEGRADED", "LOST"},
     "reference": {"from_s", "position_rmse_deg", "velocity_rmse", "force_rmse_percent_weight"},
+    "lag_s": set(),
     "span_s": set(),
     "wall_s": set(),
     "realtime_factor": set(),

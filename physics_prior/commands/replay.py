@@ -7,14 +7,18 @@ The same recording gives the same numbers as the live node, bit for bit.
 Examples:
   physics-prior replay my_bag --scene double_pendulum
   physics-prior replay my_bag --scene double_pendulum --smooth -o estimates --plot estimates.png
+  physics-prior replay my_bag --scene double_pendulum --lag 0.05
   physics-prior replay my_bag --scene my_scene.yaml --reference /truth/joint_states --json -
   physics-prior replay my_walk --scene my_person.yaml --smooth --reference /force_plate/1 --reference /force_plate/2
 """
 
 import argparse
+import math
 from pathlib import Path
 
 from physics_prior.commands.terminal import STDOUT, progress, require_folder, whole_file, write_json
+
+LONGEST_LAG = 3600.0  # s
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,7 +28,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", "--output", metavar="OUTBAG", type=Path, help="a bag to write, with the topics that the node publishes"
     )
-    parser.add_argument("--smooth", action="store_true", help="estimate every moment from the whole recording")
+    told = parser.add_mutually_exclusive_group()
+    told.add_argument("--smooth", action="store_true", help="estimate every moment from the whole recording")
+    told.add_argument(
+        "--lag",
+        metavar="SECONDS",
+        type=lag,
+        default=0.0,
+        help="estimate every moment from what was measured up to so much later, as the node's parameter `lag` does"
+        " (default: 0, causal)",
+    )
     parser.add_argument(
         "--process",
         choices=("physics", "kinematic"),
@@ -41,6 +54,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--plot", metavar="FILE", help="draw the estimates: .png, .svg or .pdf")
     parser.add_argument("--json", metavar="FILE", help="write the figures as JSON; - prints that and nothing else")
+
+
+def lag(text: str) -> float:
+    """A lag in s; ArgumentTypeError if it is none."""
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not 0.0 <= seconds <= LONGEST_LAG:
+        raise argparse.ArgumentTypeError(f"{text} is not a lag: give 0 to {LONGEST_LAG:g} s, or --smooth")
+    return seconds
 
 
 def run(args: argparse.Namespace) -> int:
@@ -65,6 +89,7 @@ def run(args: argparse.Namespace) -> int:
             scene,
             out=args.output,
             smooth=args.smooth,
+            lag=args.lag,
             process=args.process,
             references=args.reference,
             progress=report,

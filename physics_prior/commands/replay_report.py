@@ -31,8 +31,7 @@ def print_report(result: ReplayResult, written: Sequence[str]) -> None:
 
 
 def _figures(result: ReplayResult, figures: dict[str, Any]) -> Table:
-    kind = "smoothed by the whole recording" if result.smoothed else "causal"
-    out = table(f"{result.scene.name}, {kind}", "", "")
+    out = table(f"{result.scene.name}, {result.kind}", "", "")
     counts = figures["measurements"]
     out.add_row("measurements", ", ".join(f"{counts[key]} {key}" for key in counts))
     factor = figures["realtime_factor"]

@@ -1,4 +1,4 @@
-"""Smoothing of a whole recording: every estimate told by all measurements, those after it too.
+"""Smoothing: estimates told by measurements after them too, of a window or a whole recording.
 
 Rauch, Tung and Striebel's backward pass in the error state, in square-root form (Sarkka 2013, ch. 8): with the gain
 C = P F^T P_predicted^+, the smoothed covariance is (I - C F) P (I - C F)^T + C (G G^T + P_later) C^T, a sum of squares.
@@ -6,6 +6,7 @@ C = P F^T P_predicted^+, the smoothed covariance is (I - C F) P (I - C F)^T + C 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -33,12 +34,30 @@ class Step:
     predicted: State
     predicted_factor: np.ndarray
 
+    @cached_property
+    def gain(self) -> np.ndarray:
+        """(n, n) C."""
+        scale = deviations(self.predicted_factor)
+        inverse = np.linalg.pinv(self.predicted_factor / scale[:, None], rcond=INVERTIBLE) / scale
+        return np.asarray(self.factor @ self.carried.T @ inverse.T @ inverse)
 
-def smooth(filter: Filter, nodes: Sequence[Node], period: float) -> list[Posterior]:
+    @cached_property
+    def untold(self) -> np.ndarray:
+        """(n, n + g) the columns of the smoothed covariance that nothing later changes, (1 - C F) S and C G."""
+        return np.concatenate([self.factor - self.gain @ self.carried, self.gain @ self.noise], axis=1)
+
+
+Known = dict[tuple[Posterior, int], list[Step]]
+"""The steps from a posterior to a later stamp, ns."""
+
+
+def smooth(filter: Filter, nodes: Sequence[Node], period: float, known: Known | None = None) -> list[Posterior]:
     """Smoothed posteriors, oldest first: one a stamp, and one every ``period`` seconds where nothing was measured.
 
-    nodes: all nodes of a recording in order, as the history rolled them. The chain is cut where the filter started anew.
+    nodes: the nodes of a window or a recording in order, as the history rolled them. The chain is cut where the filter started
+    anew. known: steps that windows share; it is added to.
     """
+    known = {} if known is None else known
     last: dict[int, Posterior] = {}  # the last posterior at a stamp knows all that was measured then
     grips: dict[int, list[Step]] = {}  # of commands and measured forces at a stamp
     restarts = set()
@@ -60,7 +79,9 @@ def smooth(filter: Filter, nodes: Sequence[Node], period: float) -> list[Posteri
             out.append(later)
             continue
         state, factor = later.state, later.factor
-        for step in reversed([*_steps(filter, last[own], after), *grips.get(after, [])]):
+        if (last[own], after) not in known:
+            known[last[own], after] = _steps(filter, last[own], after)
+        for step in reversed([*known[last[own], after], *grips.get(after, [])]):
             state, factor, holds = _back(filter, step, last[own].begun, state, factor)
             later = replace(last[own], stamp=step.stamp, state=state, factor=factor, holds=holds)
             if step.stamp == own or out[-1].stamp - step.stamp >= period * NANOSECONDS:
@@ -112,11 +133,8 @@ def _back(
     filter: Filter, step: Step, begun: int, state: State, factor: np.ndarray
 ) -> tuple[State, np.ndarray, tuple[Hold, ...]]:
     """The smoothed state and factor at a step's beginning from those at its end, and what held there."""
-    scale = deviations(step.predicted_factor)
-    inverse = np.linalg.pinv(step.predicted_factor / scale[:, None], rcond=INVERTIBLE) / scale
-    gain = step.factor @ step.carried.T @ inverse.T @ inverse
-    W = np.concatenate([step.factor - gain @ step.carried, gain @ step.noise, gain @ factor], axis=1)
-    smoothed = filter.process.displace(step.state, gain @ filter.process.difference(step.predicted, state))
+    W = np.concatenate([step.untold, step.gain @ factor], axis=1)
+    smoothed = filter.process.displace(step.state, step.gain @ filter.process.difference(step.predicted, state))
     out = lower_factor(W)
     filter.simulator.switches.holds = step.holds
     filter.simulator.time = (step.stamp - begun) / NANOSECONDS

@@ -1,5 +1,6 @@
 """Estimates out: the messages that a scene publishes at each, whoever sends or files them."""
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -39,7 +40,9 @@ class Output:
         topics: topic -> message type, all that there will ever be.
     """
 
-    def __init__(self, scene: Scene, simulator: Simulator) -> None:
+    def __init__(self, scene: Scene, simulator: Simulator, lag: float = 0.0) -> None:
+        """lag: s after each estimate that measurements told it, infinite for all of a recording."""
+        self._lag = {} if lag == 0.0 else {"lag s": "the whole recording" if math.isinf(lag) else f"{lag:g}"}
         self.topics = topics_of(scene)
         self._scene, self._simulator = scene, simulator
         self._scalars, self._vectors = scalar_links(scene.tree), vector_links(scene.tree)
@@ -90,7 +93,9 @@ class Output:
     ) -> list[Publication]:
         """Health at a stamp, ns, with its cause and numbers; ``more`` adds named values of the caller's own."""
         header = self._header(stamp)
-        status = diagnostics.diagnostics(header, self._scene, self._simulator, health, counts, estimate, more)
+        status = diagnostics.diagnostics(
+            header, self._scene, self._simulator, health, counts, estimate, {**self._lag, **more}
+        )
         return [(DIAGNOSTICS, status)]
 
     def active_effects(self, estimate: Estimate) -> list[str]:

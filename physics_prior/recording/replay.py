@@ -4,6 +4,7 @@ Messages are taken in the order in which they were logged, so that late ones com
 estimate is carried on at the rate at which the node would publish it.
 """
 
+import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -20,9 +21,9 @@ from physics_prior.estimation.estimator import Estimator
 from physics_prior.estimation.filter import Posterior
 from physics_prior.estimation.force_score import Comparison, ForceScore
 from physics_prior.estimation.history import Node
+from physics_prior.estimation.lagged import WHOLE, Lagged
 from physics_prior.estimation.readout import deviations, evaluate, measured_acceleration, unit
 from physics_prior.estimation.score import FROM_SECONDS, Score
-from physics_prior.estimation.smoother import smooth as smooth_nodes
 from physics_prior.interface import Output, take_in
 from physics_prior.recording.reader import BagReader, open_bag
 from physics_prior.recording.references import read_references
@@ -42,7 +43,7 @@ class ReplayResult:
     """What a replay found.
 
     Attributes:
-        scene: what was estimated; smoothed: by all measurements or only by past ones.
+        scene: what was estimated; lag: s after each estimate that measurements told it, infinite for all of them.
         epoch: stamp of the first estimate, ns; all other times count from it.
         stamps: (k,) seconds.
         readouts, deviations: readout name -> (k,) or (k, 3); values and standard deviations; units by name.
@@ -57,7 +58,7 @@ class ReplayResult:
     """
 
     scene: Scene
-    smoothed: bool
+    lag: float = 0.0
     epoch: int = 0
     counts: Counts = field(default_factory=Counts)
     loss: str | None = None
@@ -79,6 +80,13 @@ class ReplayResult:
     wall_s: float = 0.0
     health_s: dict[str, float] = field(default_factory=dict)
 
+    @property
+    def kind(self) -> str:
+        """What told the estimates, in words."""
+        if math.isinf(self.lag):
+            return "smoothed by the whole recording"
+        return f"smoothed by {1e3 * self.lag:g} ms more" if self.lag > 0.0 else "causal"
+
     def summary(self) -> dict[str, Any]:
         """The figures of ``replay --json``: plain numbers, None where there is none."""
         nis, dimension = self.nis[~self.gated], self.nis_dimension[~self.gated]
@@ -87,6 +95,7 @@ class ReplayResult:
             mean, expected = float(nis.mean()), float(dimension.mean())
             low, high = (float(bound) / len(nis) for bound in chi2.interval(BAND, float(dimension.sum())))
         return {
+            "lag_s": None if math.isinf(self.lag) else self.lag,
             "measurements": dict(vars(self.counts)),
             "span_s": self.span_s,
             "wall_s": self.wall_s,
@@ -102,6 +111,7 @@ def replay(
     scene: Scene,
     out: Path | None = None,
     smooth: bool = False,
+    lag: float = 0.0,
     process: str = "physics",
     references: Sequence[str] = (),
     publish_rate: float = 30.0,
@@ -110,15 +120,16 @@ def replay(
 ) -> ReplayResult:
     """Run a recording through a scene's estimator.
 
-    out: a bag to write, with the topics of the node. smooth: estimate each stamp from the whole recording. references: topics
-    to score against, a JointState and WrenchStamped ones of force plates. publish_rate: Hz, of predictions where nothing is
-    measured. until: s after the bag's first measurement, where to stop. progress: told the share that is done.
+    out: a bag to write, with the topics of the node. smooth: estimate each stamp from the whole recording; lag: or from what was
+    measured up to so many s after it. references: topics to score against, a JointState and WrenchStamped ones of force plates.
+    publish_rate: Hz, of predictions where nothing is measured. until: s after the bag's first measurement, where to stop.
+    progress: told the share that is done.
 
     Raises:
         RecordingError: the bag, a topic or the output is not usable; nothing is left half-written.
         SimulationError: the scene's motion cannot be computed.
     """
-    return _Replay(bag, scene, smooth, process, references, publish_rate, until).run(out, progress)
+    return _Replay(bag, scene, math.inf if smooth else lag, process, references, publish_rate, until).run(out, progress)
 
 
 class _Replay:
@@ -128,7 +139,7 @@ class _Replay:
         self,
         bag: Path,
         scene: Scene,
-        smoothed: bool,
+        lag: float,
         process: str,
         references: Sequence[str],
         publish_rate: float,
@@ -136,16 +147,16 @@ class _Replay:
     ) -> None:
         self.reader = open_bag(bag)
         self.until = FOREVER if until is None else until
-        self.scene, self.smoothed, self.period = scene, smoothed, 1.0 / publish_rate
+        self.scene, self.period = scene, 1.0 / publish_rate
         self.sources = _sources(self.reader, scene)
         self.reference, plates = read_references(self.reader, references, scene)
-        self.estimator = Estimator(scene, process, FOREVER if smoothed else HISTORY_SECONDS)
+        self.estimator = Estimator(scene, process, FOREVER if math.isinf(lag) else HISTORY_SECONDS + lag)
         self.estimator.on_settled = self._settle
         self.simulator, self.process = self.estimator.simulator, self.estimator.filter.process
         self.score = Score(scene, self.simulator, self.reference.names) if self.reference is not None else None
         self.force_score = ForceScore(scene, self.simulator, plates) if plates else None
-        self.result = ReplayResult(scene, smoothed, loss=self.reader.loss)
-        self.settled: list[Node] = []
+        self.lagged = Lagged(self.estimator, WHOLE if math.isinf(lag) else round(lag * NANOSECONDS), self.period)
+        self.result = ReplayResult(scene, lag, loss=self.reader.loss)
         self.rows: list[tuple[int, int, dict[str, np.ndarray], dict[str, np.ndarray]]] = []
         self.true: list[tuple[int, dict[str, np.ndarray]]] = []
         self.innovations: list[tuple[int, float, int, bool, str]] = []
@@ -157,26 +168,26 @@ class _Replay:
         began = time.perf_counter()
         with ExitStack() as stack:
             self.writer = stack.enter_context(BagWriter(out)) if out is not None else None
-            self.output = Output(self.scene, self.simulator)
+            self.output = Output(self.scene, self.simulator, self.result.lag)
             if self.writer is not None:
                 for topic, message_type in self.output.topics.items():
                     self.writer.add_topic(_absolute(topic), message_type)
             for log_time, posterior in self._posteriors(progress):
-                if not self.smoothed:
-                    self._emit(posterior, log_time)
-            self.estimator.reset()
-            if self.smoothed:
-                for posterior in smooth_nodes(self.estimator.filter, self.settled, self.period):
-                    self._emit(posterior, posterior.stamp)
+                self._emit(posterior, log_time)
         self._finish(time.perf_counter() - began)
         return self.result
 
     def _posteriors(self, progress: Callable[[float], None] | None) -> Iterator[tuple[int, Posterior]]:
-        """The last posterior at each stamp, and predictions where none comes, with the log time of each."""
+        """The posteriors as they are due, and predictions where none is measured, with the log time of each."""
         total = sum(self.reader.topics[topic].count for topic in self.sources)
-        pending: tuple[int, Posterior] | None = None
-        coasting = 0
+        lagged, period = self.lagged, round(self.period * NANOSECONDS)
+        arrived = stamp = coasting = 0  # log time and stamp of the newest measurement, and how long none has come, ns
         self.first_log = self.last_log = 0
+
+        def logged(posterior: Posterior) -> int:
+            """When its lag has passed; a smoothed recording has no such time."""
+            return posterior.stamp if lagged.lag == WHOLE else arrived + max(0, posterior.stamp + lagged.lag - stamp)
+
         for index, record in enumerate(self.reader.read(self.sources)):
             self.first_log = self.first_log or record.log_time_ns
             if record.log_time_ns - self.first_log > self.until * NANOSECONDS:
@@ -184,25 +195,23 @@ class _Replay:
             self.last_log = max(self.last_log, record.log_time_ns)
             if progress is not None and index % 100 == 0:
                 progress(index / total)
-            if pending is not None:
-                period = round(self.period * NANOSECONDS)
-                while record.log_time_ns - pending[0] > period + coasting:
-                    if coasting == 0:
-                        yield pending
-                    coasting += period
-                    yield pending[0] + coasting, self._carried(pending[1], coasting)
-            if take_in(self.estimator, self.sources[record.topic], record.message_type, record.data):
-                newest = self.estimator.history.nodes[-1].posterior
-                if pending is not None and pending[1].stamp != newest.stamp and coasting == 0:
-                    yield pending
-                pending, coasting = (record.log_time_ns, newest), 0
-        if pending is not None and coasting == 0:
-            yield pending
+            while arrived and record.log_time_ns - arrived > period + coasting:
+                coasting += period
+                for posterior in lagged.due(stamp + coasting):
+                    yield logged(posterior), posterior
+                if coasting > lagged.lag and self.estimator.ready:
+                    newest = self.estimator.history.nodes[-1].posterior
+                    yield arrived + coasting, self.estimator.filter.predict(newest, stamp + coasting - lagged.lag)
+            changed = take_in(self.estimator, self.sources[record.topic], record.message_type, record.data)
+            for posterior in lagged.due(self.estimator.stamp):
+                yield min(record.log_time_ns, logged(posterior)), posterior
+            if changed:
+                arrived, stamp, coasting = record.log_time_ns, self.estimator.stamp, 0
+        self.estimator.reset()
+        for posterior in lagged.rest():
+            yield logged(posterior), posterior
         if progress is not None:
             progress(1.0)
-
-    def _carried(self, posterior: Posterior, ahead: int) -> Posterior:
-        return self.estimator.filter.predict(posterior, posterior.stamp + ahead)
 
     def _emit(self, posterior: Posterior, log_time: int) -> None:
         """Note an estimate, score it and file it."""
@@ -254,9 +263,8 @@ class _Replay:
             self.writer.write(_absolute(topic), message, log_time)
 
     def _settle(self, node: Node) -> None:
-        """Keep a node whose outcome is final."""
-        if self.smoothed:
-            self.settled.append(node)
+        """Note the innovation of a node whose outcome is final."""
+        self.lagged.settle(node)
         posterior = node.posterior
         if posterior.used is not None and posterior.dimension > 0:
             self.innovations.append(

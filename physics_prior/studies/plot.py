@@ -79,7 +79,6 @@ def plot_replay(result: ReplayResult, path: Path) -> None:
 
 
 def _title(result: ReplayResult) -> str:
-    kind = "smoothed by the whole recording" if result.smoothed else "causal"
     figures = result.summary()
     counts, nis, score = figures["measurements"], figures["nis"], figures["reference"] or {}
     facts = [f"{counts['used']} of {counts['read']} measurements used"]
@@ -94,7 +93,7 @@ def _title(result: ReplayResult) -> str:
         )
         if score.get(key) is not None
     ]
-    return f"{result.scene.name}: {kind} estimate \u00b1{SIGMAS:g} standard deviations\n{';  '.join(facts)}"
+    return f"{result.scene.name}: {result.kind} estimate \u00b1{SIGMAS:g} standard deviations\n{';  '.join(facts)}"
 
 
 def _readout(result: ReplayResult, name: str, order: np.ndarray, left: Axes, right: Axes) -> None:

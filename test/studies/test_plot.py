@@ -26,7 +26,6 @@ def result(count=500, reference=True):
     health = np.where(np.abs(t - 5.0) < 0.5, Level.DEGRADED, Level.OK)
     return ReplayResult(
         scene=load_scene("pendulum"),
-        smoothed=False,
         counts=Counts(read=count, used=count),
         stamps=t,
         readouts=readouts,

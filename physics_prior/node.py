@@ -1,9 +1,10 @@
 """The ROS 2 node: measurements in, estimates out. Only the middleware is here; what messages mean is in `interface`."""
 
+import math
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -30,6 +31,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from physics_prior.estimation.estimate import Estimate, Health, Level
 from physics_prior.estimation.estimator import Estimator
+from physics_prior.estimation.lagged import Lagged
 from physics_prior.interface import Output, take_in
 from physics_prior.interface.output import Publication
 from physics_prior.interface.pace import Pace
@@ -139,8 +141,10 @@ class PhysicsPriorNode(LifecycleNode):
             self.get_logger().info(f"step chosen: {choice.taken.scheme}, {1e3 * choice.taken.step.size:g} ms")
         scene = replace(scene, frame_id=self._value("frame_id") or scene.frame_id)
         warm_up(scene)
-        self._estimator = Estimator(scene, history_length=self._value("history_length"))
-        self._output = Output(scene, self._estimator.simulator)
+        lag = self._value("lag")
+        self._estimator = Estimator(scene, history_length=self._value("history_length") + lag)
+        self._output = Output(scene, self._estimator.simulator, lag)
+        self._lag_anew()
         for topic, message_type in self._output.topics.items():
             # markers are latched: a viewer that comes late sees the model at once
             durability = DurabilityPolicy.TRANSIENT_LOCAL if topic == MARKERS else DurabilityPolicy.VOLATILE
@@ -217,7 +221,17 @@ class PhysicsPriorNode(LifecycleNode):
     def _reset(self) -> None:
         assert self._estimator is not None
         self._estimator.reset()
+        self._lag_anew()
         self._forget()
+
+    def _lag_anew(self) -> None:
+        """Owe nothing of what was measured so far."""
+        assert self._estimator is not None
+        rate = self._value("publish_rate")
+        period = 1.0 / rate if rate > 0.0 else math.inf
+        self._lagged = Lagged(self._estimator, round(self._value("lag") * 1e9), period)
+        if self._lagged.lag > 0:
+            self._estimator.on_settled = self._lagged.settle
 
     def _reset_asked(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._reset()
@@ -271,21 +285,31 @@ class PhysicsPriorNode(LifecycleNode):
         return self._estimator.stamp + max(0, self._now() - self._arrived)
 
     def _publish_states(self, stamp: int) -> None:
-        assert self._estimator is not None
+        """Publish what is to be told at a time, ns on the clock of the measurements."""
         assert self._output is not None
         try:
-            estimate = self._estimator.estimate(stamp + round(self._value("prediction_horizon") * 1e9))
-            self._publish(self._output.states(estimate))
+            for estimate in self._estimates(stamp):
+                self._publish(self._output.states(estimate))
+                before, self._latest = self._latest, estimate
+                self._watch_health()
+                if before is not None and self._value("diagnostics_rate") > 0.0:
+                    active = self._output.active_effects
+                    if active(estimate) != active(before):  # told at once: when is as much asked for as which
+                        self._diagnose()
         except PhysicsPriorError as error:
             self.get_logger().error(f"{error}; the estimate starts anew")
             self._reset()
-            return
-        before, self._latest = self._latest, estimate
-        self._watch_health()
-        if before is not None and self._value("diagnostics_rate") > 0.0:
-            active = self._output.active_effects
-            if active(estimate) != active(before):  # told at once: when is as much asked for as which
-                self._diagnose()
+
+    def _estimates(self, stamp: int) -> Iterator[Estimate]:
+        """The estimate for a time, ns, or, with a lag, those whose lag has passed by then."""
+        estimator, lag = self._estimator, self._lagged.lag
+        assert estimator is not None
+        horizon = round(self._value("prediction_horizon") * 1e9)
+        for posterior in self._lagged.due(stamp) if lag > 0 else ():
+            ahead = estimator.filter.predict(posterior, posterior.stamp + horizon)
+            yield replace(estimator.describe(ahead), counts=estimator.counts)
+        if lag == 0 or stamp - lag > estimator.stamp:
+            yield estimator.estimate(stamp - lag + horizon)
 
     def _draw(self) -> None:
         assert self._output is not None

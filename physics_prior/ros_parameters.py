@@ -39,6 +39,7 @@ SETTINGS = {
     "scene": Setting("", "scene to estimate: the name of a shipped one or the path of a file", read_once=True),
     "frame_id": Setting("", "world frame of all messages; empty: the scene's own", read_once=True),
     "history_length": Setting(1.0, "s that a measurement may come late and still find its place", (0.0, 60.0), True),
+    "lag": Setting(0.0, "s after its stamp that an estimate is told by measurements, and published", (0.0, 10.0), True),
     "prediction_horizon": Setting(0.0, "s that published states are predicted past the newest measurement", (0.0, 1.0)),
     "publish_rate": Setting(100.0, "Hz of predicted states while no measurements come; 0: none", (0.0, 1000.0)),
     "marker_rate": Setting(20.0, "Hz of markers; 0: none", (0.0, 100.0)),

@@ -18,6 +18,7 @@ from visualization_msgs.msg import MarkerArray
 
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.estimation.estimator import Estimator
+from physics_prior.estimation.lagged import Lagged
 from physics_prior.interface import Output, take_in
 from physics_prior.recording.cdr import decode, encode
 from physics_prior.recording.messages import Header
@@ -67,6 +68,27 @@ def test_states_are_those_of_the_estimator_bit_by_bit(graph, scene, measured, se
     expected |= last
     assert by_stamp(received) == expected
     assert len(expected) >= 148  # of 150 moments; the first two make the start
+
+
+def test_lagged_states_are_those_of_a_lagged_replay_bit_by_bit(graph, scene, measured, send):
+    node = graph.node(lag=0.05, diagnostics_rate=50.0)
+    received = graph.collect(JointState, "joint_states", raw=True)
+    diagnostics = graph.collect(DiagnosticArray, "/diagnostics")
+    send(node, measured)
+    estimator = Estimator(scene, history_length=1.05)
+    lagged, output, expected = Lagged(estimator, 50_000_000, 1.0), Output(scene, estimator.simulator), {}
+    estimator.on_settled = lagged.settle
+    sources = {source.topic: source for source in scene.measurements}
+    for measurement in measured:
+        message = message_of(measurement, scene.frame_id)
+        take_in(estimator, sources[measurement.topic], message.ros_type, encode(message))
+        for posterior in lagged.due(estimator.stamp):
+            states = dict(output.states(estimator.describe(posterior)))
+            expected[posterior.stamp] = encode(states["joint_states"])
+    graph.until(lambda: by_stamp(received) == expected, "the states")
+    assert len(expected) >= 140  # of 150 moments, the last five owed
+    graph.until(lambda: diagnostics, "diagnostics")
+    assert {value.key: value.value for value in diagnostics[-1].status[0].values}["lag s"] == "0.05"
 
 
 def test_a_plain_subscriber_reads_every_topic(graph, scene, measured, send):

@@ -21,7 +21,7 @@ class Lagged:
         """lag: ns, that the estimator's history must reach back; period: s, of estimates where nothing was measured."""
         self.lag = lag
         self._estimator, self._period = estimator, period
-        self._given = 0  # stamp of the last one given out, ns
+        self._given = self._newest = 0  # stamps of the last one given out and of the last one measured then, ns
         self._history = estimator.history
         self._left: list[Node] = []  # settled before they were
         self._known: Known = {}
@@ -48,17 +48,24 @@ class Lagged:
             window = nodes[first : bisect_right(nodes, stamp + self.lag, key=_stamp)]
             following = _stamp(nodes[after]) if after < len(nodes) else stamp + 1
             self._given = stamp
+            if not self._timely(stamp):
+                continue
             for key in [key for key in self._known if key[0].stamp < stamp]:
                 del self._known[key]
             yield from (each for each in self._smoothed(window) if each.stamp < following)
         self._left = []
+        self._newest = _stamp(nodes[-1]) if nodes else 0
 
     def rest(self) -> Iterator[Posterior]:
         """What is owed of the nodes that the estimator has forgotten: all of it after ``Estimator.reset``."""
         left, self._left = self._left, []
         if left:
             self._given = _stamp(left[-1])
-            yield from self._smoothed(left)
+            yield from (each for each in self._smoothed(left) if self._timely(each.stamp))
+
+    def _timely(self, stamp: int) -> bool:
+        """Whether an estimate may be: without a lag, of what was the newest once, and neither late nor a start's."""
+        return self.lag > 0 or stamp == self._newest
 
     def _smoothed(self, nodes: Sequence[Node]) -> list[Posterior]:
         return smooth(self._estimator.filter, nodes, self._period, self._known)

@@ -57,7 +57,7 @@ def same(one, other):
 def test_without_a_lag_it_is_the_filter(scene):
     given, nodes, _ = run(scene, 0)
     last = {node.measurement.stamp: node.posterior for node in nodes}
-    same(given, list(last.values()))
+    same(given, list(last.values())[1:])  # the first tells where the start is
 
 
 @pytest.mark.parametrize("gap", [(), range(20, 32)])

@@ -4,7 +4,7 @@ import math
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -144,7 +144,10 @@ class PhysicsPriorNode(LifecycleNode):
         lag = self._value("lag")
         self._estimator = Estimator(scene, history_length=self._value("history_length") + lag)
         self._output = Output(scene, self._estimator.simulator, lag)
-        self._lag_anew()
+        rate = self._value("publish_rate")
+        self._lagged = Lagged(self._estimator, round(lag * 1e9), 1.0 / rate if rate > 0.0 else math.inf)
+        if lag > 0.0:
+            self._estimator.on_settled = self._lagged.settle
         for topic, message_type in self._output.topics.items():
             # markers are latched: a viewer that comes late sees the model at once
             durability = DurabilityPolicy.TRANSIENT_LOCAL if topic == MARKERS else DurabilityPolicy.VOLATILE
@@ -221,17 +224,8 @@ class PhysicsPriorNode(LifecycleNode):
     def _reset(self) -> None:
         assert self._estimator is not None
         self._estimator.reset()
-        self._lag_anew()
+        self._lagged.forget()
         self._forget()
-
-    def _lag_anew(self) -> None:
-        """Owe nothing of what was measured so far."""
-        assert self._estimator is not None
-        rate = self._value("publish_rate")
-        period = 1.0 / rate if rate > 0.0 else math.inf
-        self._lagged = Lagged(self._estimator, round(self._value("lag") * 1e9), period)
-        if self._lagged.lag > 0:
-            self._estimator.on_settled = self._lagged.settle
 
     def _reset_asked(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._reset()
@@ -288,7 +282,7 @@ class PhysicsPriorNode(LifecycleNode):
         """Publish what is to be told at a time, ns on the clock of the measurements."""
         assert self._output is not None
         try:
-            for estimate in self._estimates(stamp):
+            for estimate in self._lagged.estimates(stamp, round(self._value("prediction_horizon") * 1e9)):
                 self._publish(self._output.states(estimate))
                 before, self._latest = self._latest, estimate
                 self._watch_health()
@@ -299,17 +293,6 @@ class PhysicsPriorNode(LifecycleNode):
         except PhysicsPriorError as error:
             self.get_logger().error(f"{error}; the estimate starts anew")
             self._reset()
-
-    def _estimates(self, stamp: int) -> Iterator[Estimate]:
-        """The estimate for a time, ns, or, with a lag, those whose lag has passed by then."""
-        estimator, lag = self._estimator, self._lagged.lag
-        assert estimator is not None
-        horizon = round(self._value("prediction_horizon") * 1e9)
-        for posterior in self._lagged.due(stamp) if lag > 0 else ():
-            ahead = estimator.filter.predict(posterior, posterior.stamp + horizon)
-            yield replace(estimator.describe(ahead), counts=estimator.counts)
-        if lag == 0 or stamp - lag > estimator.stamp:
-            yield estimator.estimate(stamp - lag + horizon)
 
     def _draw(self) -> None:
         assert self._output is not None

@@ -2,7 +2,9 @@
 
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
+from physics_prior.estimation.estimate import Estimate
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.estimation.filter import Posterior
 from physics_prior.estimation.history import Node
@@ -25,6 +27,27 @@ class Lagged:
         self._history = estimator.history
         self._left: list[Node] = []  # settled before they were
         self._known: Known = {}
+
+    def estimates(self, present: int, ahead: int) -> Iterator[Estimate]:
+        """What to publish at the present time, ns on the clock of the measurements, each predicted for so many ns more.
+
+        Without a lag the newest estimate, predicted for the present; with one those that are due, or what is predicted where it is
+        not measured any more.
+
+        Raises:
+            MeasurementError: not started yet; SimulationError: a prediction left the numbers.
+        """
+        estimator = self._estimator
+        for posterior in self.due(present) if self.lag > 0 else ():
+            later = estimator.filter.predict(posterior, posterior.stamp + ahead)
+            yield replace(estimator.describe(later), counts=estimator.counts)
+        if self.lag == 0 or present - self.lag > estimator.stamp:
+            yield estimator.estimate(present - self.lag + ahead)
+
+    def forget(self) -> None:
+        """Owe nothing of what was measured so far."""
+        self._given = self._newest = 0
+        self._history, self._left, self._known = self._estimator.history, [], {}
 
     def settle(self, node: Node) -> None:
         """Keep a node that the estimator forgets before it was given out."""

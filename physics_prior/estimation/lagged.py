@@ -31,8 +31,8 @@ class Lagged:
     def estimates(self, present: int, ahead: int) -> Iterator[Estimate]:
         """What to publish at the present time, ns on the clock of the measurements, each predicted for so many ns more.
 
-        Without a lag the newest estimate, predicted for the present; with one those that are due, or what is predicted where it is
-        not measured any more.
+        Without a lag the newest estimate, predicted for the present; with one those that are due, or what is predicted where
+        nothing is measured any more.
 
         Raises:
             MeasurementError: not started yet; SimulationError: a prediction left the numbers.

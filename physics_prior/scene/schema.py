@@ -197,7 +197,7 @@ class Step(Section):
 class Accuracy(Section):
     """What is asked in place of a step: an error, m, or a cost, s of the processor per measurement or times real time."""
 
-    tolerance: PositiveLength | None = None
+    tolerance: Annotated[Length, Field(ge=1e-13)] | None = None  # below it is rounding
     budget: Annotated[PositiveTime, BeforeValidator(_per_step)] | None = None
     real_time_factor: Annotated[Number, Field(gt=0.0)] | None = None
 

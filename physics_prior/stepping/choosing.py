@@ -15,6 +15,7 @@ from physics_prior.stepping.course import course_of
 from physics_prior.stepping.trials import Report, Scheme, Trials
 
 TOLD = 1e-6  # m, where no error is asked for: the right motion is known at least so well
+ROUNDING = 1e-12  # m: no budget buys less
 HEADROOM = 0.8  # of what may be spent is what further steps may take it to: clocks waver, and so do motions
 STAMPS = 60  # of measurements that an estimator is timed on
 SPAN = 4  # times as many steps, from whose costs that of one is told
@@ -63,7 +64,7 @@ def choose(scene: Scene, asked: Accuracy, report: Report = lambda what: None) ->
         taken, work = cheapest(found), "moving"
     else:
         found, work = _within(scene, trials, allowed, report)
-        taken = most_exact(found, allowed, trials.reference)
+        taken = most_exact(found, allowed, max(ROUNDING, trials.reference))
     return Choice(
         asked=asked,
         taken=taken,
@@ -92,7 +93,8 @@ def _within(scene: Scene, trials: Trials, allowed: float, report: Report) -> tup
         few, many = costs([scheme.step(interval, 1), scheme.step(interval, SPAN)])
         each = max((many - few) / (SPAN - 1), 1e-3 * few)
         n = min(max(1, 1 + int((HEADROOM * allowed - few) / each)), FINEST)
-        enough = trials.reach(scheme, trials.reference, n) if trials.error(scheme, n) <= trials.reference else None
+        told = max(ROUNDING, trials.reference)
+        enough = trials.reach(scheme, told, n) if trials.error(scheme, n) <= told else None
         tried.append((scheme, enough or n))
     steps = [scheme.step(interval, n) for scheme, n in tried]
     return [

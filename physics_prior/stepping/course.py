@@ -94,7 +94,7 @@ class Follower:
     def sights(self) -> list[np.ndarray]:
         """Run; return what is seen at the start and at the times. SimulationError where the motion is lost."""
         seen: list[np.ndarray] = []
-        self._run(self._course.times, lambda q, v: seen.append(self._course.observe(self._simulator, q, v)))
+        self._run(self._course.times, lambda q, v: seen.append(self._course.observe(self._simulator, q, v).copy()))
         return seen
 
     def seconds(self) -> float:

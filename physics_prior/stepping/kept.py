@@ -24,6 +24,7 @@ def path_of(scene: Scene) -> Path:
     frames = [tree.frame(name) for name in tree.frames]
     pairs = pair_records(tree, [pair for effect in effects for pair in effect.point_pairs(tree)])
     parts = [
+        *(source.read_bytes() for source in sorted(Path(__file__).parent.glob("*.py"))),  # how it is chosen
         link_records(tree, pairs).tobytes(),
         step_source(effects, kinds_of_rows(tree, effects)[0], DEFAULT).encode(),
         *(repr(each).encode() for each in (effects, scene.measurements, scene.gate, scene.simulation, scene.accuracy)),

@@ -14,11 +14,8 @@ from physics_prior.stepping.choice import Measured
 from physics_prior.stepping.course import Course, Follower
 from physics_prior.stepping.search import coarsest, first
 
-RIGHT, NEARLY_RIGHT = (
-    1e-13,
-    1e-11,
-)  # tolerances of the right motion, at half steps, and of that which shows how right it is
 LOOSE = 1e-2  # tolerance of an integrator of its own steps that is to keep to the steps given, where they resolve
+AGREEING = 3  # ways to the right motion
 SHARE = 1 / 3  # of an error: how surely the right motion has to be known to tell it
 SHORTEST = 0.1  # of a course: less of it tells too little
 ROUNDS = 5  # of timing, all contestants in turns
@@ -53,6 +50,9 @@ class Scheme:
         return Step(integrator=self.integrator, size=longest / n)
 
 
+RIGHT = ((2, 1e-13), (4, 1e-11), (8, 1e-9), (16, LOOSE))
+"""Ways to the right motion by dop853: into how many the longest step is divided, and the tolerance. Where a mechanism folds,
+rounding is above the tightest tolerance, and the finest steps are not the best: so three have to agree."""
 EXPLICIT = (Scheme("rk4"), Scheme("dop853"), Scheme("dop853", own_steps=True), Scheme("semi_implicit_euler"))
 IMPLICIT = (Scheme("implicit_midpoint"), Scheme("lobatto_iiic"))
 
@@ -71,14 +71,7 @@ class Trials:
     def __init__(self, course: Course, told: float, report: Report = lambda what: None) -> None:
         self._course, self._report = course, report
         report("finding the right motion")
-        ways = []
-        for size, tolerance in ((0.5 * course.longest, RIGHT), (course.longest, NEARLY_RIGHT)):
-            try:
-                ways.append(Follower(course, Step(integrator="dop853", size=size, tolerance=tolerance)).sights())
-            except SimulationError as problem:
-                raise SceneError(f"the motion from the scene's initial state is lost: {problem}") from None
-        self._right = ways[0]
-        apart = np.maximum.accumulate([course.distance(a, b) for a, b in zip(*ways, strict=True)])
+        self._right, apart = _middle(course, _ways(course))
         self.until = int(np.sum(apart <= SHARE * told))
         if self.until < 1 + SHORTEST * len(course.times):
             known = float(apart[int(np.ceil(SHORTEST * len(course.times)))])
@@ -124,7 +117,8 @@ class Trials:
         """The coarsest setting of a scheme whose error is allowed; None where there is none up to a number, or in good time."""
         self._report(f"trying {scheme.name}")
         if scheme.own_steps:
-            n = first(lambda index: self.error(scheme, index + 1) <= allowed, OWN_SETTINGS)
+            # what chooses its own steps scatters: the next tolerance has to do, too
+            n = first(lambda i: max(self.error(scheme, i + 1), self.error(scheme, i + 2)) <= allowed, OWN_SETTINGS - 1)
             return None if n is None else n + 1
         length = self._course.times[-1] / self._course.longest
 
@@ -156,3 +150,34 @@ class Trials:
                     taken.append(follower.seconds())
         length = self._course.times[-1] / self._course.longest
         return [1e6 * median(taken) / length for taken in times]
+
+
+def _ways(course: Course) -> list[list[np.ndarray]]:
+    """The motion by every way that leads to its end; SceneError if fewer than three do."""
+    found, problem = [], None
+    for parts, tolerance in RIGHT:
+        try:
+            found.append(
+                Follower(course, Step(integrator="dop853", size=course.longest / parts, tolerance=tolerance)).sights()
+            )
+        except SimulationError as error:
+            problem = error
+    if len(found) < AGREEING:
+        raise SceneError(f"the motion from the scene's initial state is lost: {problem}") from None
+    return found
+
+
+def _middle(course: Course, ways: Sequence[list[np.ndarray]]) -> tuple[list[np.ndarray], np.ndarray]:
+    """The way that two others are nearest to in the end, and how far the second was until each time, (k + 1,).
+
+    Two may agree by chance.
+    """
+    told = []
+    for one in ways:
+        apart = [
+            np.maximum.accumulate([course.distance(a, b) for a, b in zip(one, other, strict=True)])
+            for other in ways
+            if other is not one
+        ]
+        told.append((one, sorted(apart, key=lambda each: float(each[-1]))[1]))
+    return min(told, key=lambda each: float(each[1][-1]))

@@ -1,7 +1,7 @@
 """A tolerance that is asked for, put to the test: what the step chosen for it errs and costs where the motion is known."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -13,8 +13,8 @@ from physics_prior.dynamics.integrators import INTEGRATORS
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.errors import SceneError
 from physics_prior.scene import Step
-from physics_prior.stepping.choice import Measured, cheapest
-from physics_prior.stepping.course import Course
+from physics_prior.stepping.choice import cheapest
+from physics_prior.stepping.course import Course, Follower
 from physics_prior.stepping.trials import Trials
 from physics_prior.studies.accuracy.compiled import Compiled
 from physics_prior.studies.accuracy.front import seconds_to_reach
@@ -37,14 +37,17 @@ class Turn:
     Attributes:
         problem, tolerance: which; tolerance in the problem's unit.
         scheme, h: what was chosen; None where it was refused, and ``why``.
+        seconds: s that count: those until which the motion is known well enough; None if all.
         error: against the reference of other origin, over what was asked.
-        cost: processor time over that of the best on the front of the study, measured in turns; None where the front has none.
+        cost: processor time over that of the best on the front of the study, measured in turns; None where the front has none,
+            or tells errors over more seconds.
     """
 
     problem: str
     tolerance: float
     scheme: str | None = None
     h: float | None = None
+    seconds: float | None = None
     error: float | None = None
     cost: float | None = None
     why: str = ""
@@ -66,38 +69,47 @@ def run_knob(problems: Sequence[Problem], progress: Callable[[float, str], None]
 
 def turns(problem: Problem, progress: Callable[[float], None] = lambda part: None) -> list[Turn]:
     """Choose for every tolerance, then measure the choices among the settings of the study."""
-    course = course_of(problem)
-    chosen: dict[float, Measured | str] = {}
+    benchmark = problem.make()
+    course = course_of(problem, benchmark)
+    out: list[Turn] = []
+    asked: list[Compiled] = []
     for index, tolerance in enumerate(TOLERANCES):
-        try:
-            found = Trials(course, tolerance).best(tolerance)
-            chosen[tolerance] = cheapest(found) if found else "no step tried is so exact in good time"
-        except SceneError as problem_told:
-            chosen[tolerance] = str(problem_told)
+        turn, step = _choose(problem, benchmark, course, tolerance)
+        out.append(turn)
+        if step is not None:
+            asked.append(Compiled(step.integrator, [_setting(step)], f"{tolerance:g}", "chosen"))
         progress(0.5 * (index + 1) / len(TOLERANCES))
-    taken = {tolerance: each for tolerance, each in chosen.items() if isinstance(each, Measured)}
     study = [scheme for scheme in own_schemes(problem) if scheme.engine == "compiled"]
-    asked = [
-        Compiled(each.step.integrator, [_setting(each.step)], f"{tolerance:g}", "chosen")
-        for tolerance, each in taken.items()
-    ]
     points = measure(problem, [*study, *asked], lambda part: progress(0.5 + 0.5 * part))
-    found_points = {float(point.scheme): point for point in points if point.engine == "chosen"}
     front = [point for point in points if point.engine == "compiled"]
-    out = []
-    for tolerance, each in chosen.items():
-        if isinstance(each, str) or tolerance not in found_points:
-            out.append(Turn(problem.key, tolerance, why=each if isinstance(each, str) else "the run was too slow"))
-            continue
-        point, best = found_points[tolerance], seconds_to_reach(front, tolerance)
-        cost = None if best is None else point.seconds / best
-        out.append(Turn(problem.key, tolerance, each.scheme, each.step.size, point.error / tolerance, cost))
-    return out
+    seconds = {float(point.scheme): point.seconds for point in points if point.engine == "chosen"}
+    best = {turn.tolerance: seconds_to_reach(front, turn.tolerance) for turn in out if turn.seconds is None}
+    return [
+        replace(turn, cost=seconds[turn.tolerance] / reached)
+        if turn.tolerance in seconds and (reached := best.get(turn.tolerance)) is not None
+        else turn
+        for turn in out
+    ]
 
 
-def course_of(problem: Problem) -> Course:
+def _choose(problem: Problem, benchmark: Benchmark, course: Course, tolerance: float) -> tuple[Turn, Step | None]:
+    """What is chosen for a tolerance and how it errs, its cost left open; no step if it is refused."""
+    try:
+        trials = Trials(course, tolerance)
+    except SceneError as told:
+        return Turn(problem.key, tolerance, why=str(told)), None
+    found = trials.best(tolerance)
+    if not found:
+        return Turn(problem.key, tolerance, why="no step tried is so exact in good time"), None
+    taken, counted = cheapest(found), trials.until - 1
+    seen = Follower(course, taken.step).sights()[1 : counted + 1]
+    error = max(benchmark.distance(a, b) for a, b in zip(seen, benchmark.values, strict=False))
+    seconds = None if counted == len(benchmark.times) else trials.seconds
+    return Turn(problem.key, tolerance, taken.scheme, taken.step.size, seconds, error / tolerance), taken.step
+
+
+def course_of(problem: Problem, benchmark: Benchmark) -> Course:
     """A problem as steps are tried on: its error is that of the study, its longest step the coarsest there."""
-    benchmark: Benchmark = problem.make()
 
     def observe(simulator: Simulator, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         return benchmark.observe(Run(simulator, q, v))
@@ -125,14 +137,15 @@ def knob_table(found: Sequence[Turn]) -> Table:
     )
     for name in ("problem", "tolerance", "integrator"):
         out.add_column(name, header_style="dim")
-    for name in ("step", "error", "cost", ""):
+    for name in ("step", "over", "error", "cost", ""):
         out.add_column(name, justify="right", header_style="dim", no_wrap=True)
     for turn in found:
         if turn.error is None or turn.h is None:
-            out.add_row(turn.problem, f"{turn.tolerance:g}", f"refused: {turn.why}", "", "", "", "")
+            out.add_row(turn.problem, f"{turn.tolerance:g}", f"refused: {turn.why}", *[""] * 5)
             continue
         cost = "" if turn.cost is None else f"{turn.cost:.2f}"
         mark = "" if turn.kept else "*"
+        over = "" if turn.seconds is None else f"{turn.seconds:g} s"
         step = f"{1e3 * turn.h:.4g} ms"
-        out.add_row(turn.problem, f"{turn.tolerance:g}", turn.scheme, step, f"{turn.error:.2f}", cost, mark)
+        out.add_row(turn.problem, f"{turn.tolerance:g}", turn.scheme, step, over, f"{turn.error:.2f}", cost, mark)
     return out

@@ -7,6 +7,7 @@ import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
+from importlib.util import find_spec
 from typing import Any
 
 from physics_prior.errors import PhysicsPriorError
@@ -35,7 +36,7 @@ from physics_prior.estimation.lagged import Lagged
 from physics_prior.interface import Output, take_in
 from physics_prior.interface.output import Publication
 from physics_prior.interface.pace import Pace
-from physics_prior.interface.topics import MARKERS, switch_services
+from physics_prior.interface.topics import MARKERS, TRANSFORMS, switch_services
 from physics_prior.interface.warm_up import warm_up
 from physics_prior.recording.cdr import encode
 from physics_prior.ros_inputs import Input, ros_class
@@ -149,6 +150,9 @@ class PhysicsPriorNode(LifecycleNode):
         if lag > 0.0:
             self._estimator.on_settled = self._lagged.settle
         for topic, message_type in self._output.topics.items():
+            if topic == TRANSFORMS and find_spec("tf2_msgs") is None:
+                self.get_logger().info(f"{topic} is not published: it needs the package tf2_msgs")
+                continue
             # markers are latched: a viewer that comes late sees the model at once
             durability = DurabilityPolicy.TRANSIENT_LOCAL if topic == MARKERS else DurabilityPolicy.VOLATILE
             depth = 1 if topic == MARKERS else OUTPUT_QUEUE
@@ -302,7 +306,8 @@ class PhysicsPriorNode(LifecycleNode):
 
     def _publish(self, publications: Iterable[Publication]) -> None:
         for topic, message in publications:
-            self._publishers_by_topic[topic].publish(encode(message))
+            if topic in self._publishers_by_topic:
+                self._publishers_by_topic[topic].publish(encode(message))
 
     # Health ---------------------------------------------------------------------------------------------------------
 

@@ -11,13 +11,17 @@ from physics_prior.estimation.estimate import Counts, Estimate, Health
 from physics_prior.interface import diagnostics, markers, states
 from physics_prior.interface.geometry import header_of, wrench_of
 from physics_prior.interface.topics import (
+    CENTER_OF_MASS,
     DIAGNOSTICS,
+    ENERGY,
     JOINT_DEVIATIONS,
     JOINT_STATES,
     MARKERS,
     MULTI_DOF_JOINT_STATES,
     ODOMETRY,
     STATE_COVARIANCE,
+    TRANSFORMS,
+    ball_links,
     deviation_topic,
     force_topics,
     free_links,
@@ -25,7 +29,7 @@ from physics_prior.interface.topics import (
     topics_of,
     vector_links,
 )
-from physics_prior.recording.messages import Header, WrenchStamped
+from physics_prior.recording.messages import Float64, Header, WrenchStamped
 from physics_prior.recording.wire import Message
 from physics_prior.scene import Scene
 
@@ -46,12 +50,12 @@ class Output:
         self.topics = topics_of(scene)
         self._scene, self._simulator = scene, simulator
         self._scalars, self._vectors = scalar_links(scene.tree), vector_links(scene.tree)
-        self._free = free_links(scene.tree)
+        self._free, self._balls = free_links(scene.tree), ball_links(scene.tree)
         self._forces = force_topics(scene)
         self._names = scene.tree.freedom_names
 
     def states(self, estimate: Estimate) -> list[Publication]:
-        """Joints, odometry, covariance and constraint forces, each force with its standard deviations.
+        """Joints, odometry, centre of mass, energy, covariance and constraint forces, these with their standard deviations.
 
         A force is what acts ON the named part BY the constraint, in the frame of the header, at the estimate's stamp.
 
@@ -61,15 +65,18 @@ class Output:
         _require_finite(estimate)
         header = self._header(estimate.stamp)
         out: list[Publication] = []
-        if self._scalars:
-            out.append((JOINT_STATES, states.joint_states(header, self._scalars, estimate)))
-            out.append((JOINT_DEVIATIONS, states.joint_deviations(header, self._scalars, estimate)))
+        self._simulator.move(estimate.q, estimate.v)
+        if self._scalars or self._balls:
+            out.append((JOINT_STATES, states.joint_states(header, self._scalars, estimate, self._balls)))
+            out.append((JOINT_DEVIATIONS, states.joint_deviations(header, self._scalars, estimate, self._balls)))
         if self._vectors:
-            self._simulator.move(estimate.q, estimate.v)
             joints = states.multi_dof_joint_states(header, self._vectors, estimate, self._simulator)
             out.append((MULTI_DOF_JOINT_STATES, joints))
         if self._free:
             out.append((ODOMETRY, states.odometry(header, self._free[0], estimate)))
+            out.append((TRANSFORMS, states.transforms(header, self._free, estimate)))
+        out.append((CENTER_OF_MASS, states.center_of_mass(header, estimate, self._simulator)))
+        out.append((ENERGY, Float64(self._simulator.energy())))
         out.append((STATE_COVARIANCE, states.state_covariance(self._names, estimate)))
         for name, topic in self._forces.items():
             wrench, deviation = estimate.wrenches[name], estimate.wrench_deviations[name]

@@ -5,10 +5,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from physics_prior import rotations
+from physics_prior.dynamics.center_of_mass import center_of_mass as position_of_center
+from physics_prior.dynamics.center_of_mass import center_of_mass_jacobian
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.estimation.estimate import Estimate
 from physics_prior.interface.geometry import pose_of, quaternion_of, vector_of, wrench_of
 from physics_prior.model import JointKind, Link
+from physics_prior.model.ball_hinges import (
+    hinge_angles,
+    hinge_names,
+    omega_per_rates,
+    rates_per_omega,
+    state_derivative,
+)
 from physics_prior.recording.messages import (
     Float64MultiArray,
     Header,
@@ -18,25 +27,73 @@ from physics_prior.recording.messages import (
     MultiDOFJointState,
     Odometry,
     PoseWithCovariance,
+    PoseWithCovarianceStamped,
+    TFMessage,
     Transform,
+    TransformStamped,
     Twist,
     TwistWithCovariance,
     Vector3,
 )
 
 
-def joint_states(header: Header, links: Sequence[Link], estimate: Estimate) -> JointState:
-    """Position, velocity and effort (generalized force of the effects) of revolute and prismatic joints."""
+def joint_states(header: Header, links: Sequence[Link], estimate: Estimate, balls: Sequence[Link] = ()) -> JointState:
+    """Position, velocity and effort (generalized force of the effects) of revolute and prismatic joints.
+
+    Behind them those of the three hinges that stand for each ball joint in the URDF, so that robot_state_publisher knows all.
+    """
+    names = [link.joint.name for link in links]
     at, rate = [link.q.start for link in links], [link.v.start for link in links]
-    names = tuple(link.joint.name for link in links)
-    return JointState(header, names, estimate.q[at], estimate.v[rate], estimate.effort[rate])
+    columns = [[estimate.q[at]], [estimate.v[rate]], [estimate.effort[rate]]]
+    for link in balls:
+        names += hinge_names(link.joint.name)
+        angles = hinge_angles(estimate.q[link.q])
+        rates = rates_per_omega(angles) @ estimate.v[link.v]
+        torques = omega_per_rates(angles).T @ estimate.effort[link.v]
+        for column, own in zip(columns, (angles, rates, torques), strict=True):
+            column.append(own)
+    return JointState(header, tuple(names), *(np.concatenate(column) for column in columns))
 
 
-def joint_deviations(header: Header, links: Sequence[Link], estimate: Estimate) -> JointState:
+def joint_deviations(
+    header: Header, links: Sequence[Link], estimate: Estimate, balls: Sequence[Link] = ()
+) -> JointState:
     """Standard deviations of position and velocity, in the fields of these; a JointState has no place of its own for them."""
-    rate = [link.v.start for link in links]
-    names = tuple(link.joint.name for link in links)
-    return JointState(header, names, estimate.position_deviation[rate], estimate.velocity_deviation[rate])
+    at = [link.v.start for link in links]
+    names = [link.joint.name for link in links]
+    positions, velocities = [estimate.position_deviation[at]], [estimate.velocity_deviation[at]]
+    nv = len(estimate.v)
+    for link in balls:
+        names += hinge_names(link.joint.name)
+        angles = hinge_angles(estimate.q[link.q])
+        J = state_derivative(angles, rates_per_omega(angles) @ estimate.v[link.v])
+        own = np.r_[link.v.start : link.v.stop, nv + link.v.start : nv + link.v.stop]
+        spread = np.sqrt(np.maximum(np.diag(J @ estimate.covariance[np.ix_(own, own)] @ J.T), 0.0))
+        positions.append(spread[:3])
+        velocities.append(spread[3:])
+    return JointState(header, tuple(names), np.concatenate(positions), np.concatenate(velocities))
+
+
+def transforms(header: Header, links: Sequence[Link], estimate: Estimate) -> TFMessage:
+    """Where free links are in the header's frame: what a URDF, whose root they are, does not say."""
+    return TFMessage(
+        [
+            TransformStamped(
+                header, link.part, Transform(vector_of(estimate.q[link.q][:3]), quaternion_of(estimate.q[link.q][3:]))
+            )
+            for link in links
+        ]
+    )
+
+
+def center_of_mass(header: Header, estimate: Estimate, simulator: Simulator) -> PoseWithCovarianceStamped:
+    """The centre of mass of all that moves, with its covariance, along the header's axes; needs ``simulator.move``."""
+    nv = len(estimate.v)
+    J = center_of_mass_jacobian(simulator)
+    covariance = np.zeros((6, 6))
+    covariance[:3, :3] = J @ estimate.covariance[:nv, :nv] @ J.T
+    pose = pose_of(position_of_center(simulator), np.array([1.0, 0.0, 0.0, 0.0]))
+    return PoseWithCovarianceStamped(header, PoseWithCovariance(pose, _flat(covariance)))
 
 
 def multi_dof_joint_states(

@@ -5,11 +5,14 @@ import re
 from physics_prior.model import JointKind, Link, Tree
 from physics_prior.recording.messages import (
     DiagnosticArray,
+    Float64,
     Float64MultiArray,
     JointState,
     MarkerArray,
     MultiDOFJointState,
     Odometry,
+    PoseWithCovarianceStamped,
+    TFMessage,
     WrenchStamped,
 )
 from physics_prior.recording.wire import Message
@@ -21,6 +24,9 @@ JOINT_DEVIATIONS = "joint_states/stddev"
 MULTI_DOF_JOINT_STATES = "multi_dof_joint_states"
 ODOMETRY = "odometry"
 STATE_COVARIANCE = "state_covariance"
+CENTER_OF_MASS = "center_of_mass"
+ENERGY = "energy"
+TRANSFORMS = "/tf"  # absolute, as every tool expects it
 CONSTRAINT_FORCES = "constraint_forces"
 MARKERS = "markers"
 DIAGNOSTICS = "/diagnostics"  # absolute, as every tool expects it
@@ -31,12 +37,15 @@ LONGEST_NAME = 80  # characters of a force's name in its topic; a whole topic ma
 def topics_of(scene: Scene) -> dict[str, type[Message]]:
     """Return the topics that a scene publishes, each with its type, in the order of publishing."""
     topics: dict[str, type[Message]] = {}
-    if scalar_links(scene.tree):
+    if scalar_links(scene.tree) or ball_links(scene.tree):
         topics[JOINT_STATES] = topics[JOINT_DEVIATIONS] = JointState
     if vector_links(scene.tree):
         topics[MULTI_DOF_JOINT_STATES] = MultiDOFJointState
     if free_links(scene.tree):
         topics[ODOMETRY] = Odometry
+        topics[TRANSFORMS] = TFMessage
+    topics[CENTER_OF_MASS] = PoseWithCovarianceStamped
+    topics[ENERGY] = Float64
     topics[STATE_COVARIANCE] = Float64MultiArray
     for topic in force_topics(scene).values():
         topics[topic] = topics[deviation_topic(topic)] = WrenchStamped
@@ -53,6 +62,11 @@ def scalar_links(tree: Tree) -> list[Link]:
 def vector_links(tree: Tree) -> list[Link]:
     """Return the links on free and spherical joints."""
     return [link for link in tree.links if link.joint.kind in (JointKind.FREE, JointKind.SPHERICAL)]
+
+
+def ball_links(tree: Tree) -> list[Link]:
+    """Return the links on spherical joints."""
+    return [link for link in tree.links if link.joint.kind is JointKind.SPHERICAL]
 
 
 def free_links(tree: Tree) -> list[Link]:

@@ -1,8 +1,6 @@
 """Trees as URDF, for robot_state_publisher, RViz and other engines.
 
-URDF has no ball joints. One becomes three hinges about y, x and z in turn, of massless links between, so that its rotation is
-Ry(a) Rx(b) Rz(c): for a person's joints flexion, then ab- or adduction, then axial rotation, ISB's order for hips. It is
-singular at b = +-90 degrees, as every three angles are somewhere.
+URDF has no ball joints. One becomes three hinges (ball_hinges.py), of massless links between.
 """
 
 from xml.etree import ElementTree
@@ -12,12 +10,11 @@ import numpy as np
 from physics_prior import rotations
 from physics_prior.errors import ModelError
 from physics_prior.inertia import MassProperties
+from physics_prior.model.ball_hinges import AXES
 from physics_prior.model.joint import Joint, JointKind
 from physics_prior.model.part import Shape
 from physics_prior.model.tree import Tree
 
-BALL_AXES = (("y", np.array([0.0, 1.0, 0.0])), ("x", np.array([1.0, 0.0, 0.0])), ("z", np.array([0.0, 0.0, 1.0])))
-"""What the hinges that stand for a ball joint turn about, with what their names end on, as hip_y."""
 NO_LIMIT = 1e9  # where URDF wants a number for an effort, a speed or an end that a joint has not
 
 
@@ -57,19 +54,10 @@ def urdf_from_tree(tree: Tree, name: str) -> str:
     return ElementTree.tostring(robot, encoding="unicode", xml_declaration=True) + "\n"
 
 
-def ball_angles(q: np.ndarray) -> np.ndarray:
-    """(3,) rad, angles of the hinges that stand for a ball joint at the quaternion q (4,); the middle one in [-pi/2, pi/2]."""
-    R = rotations.matrix_from_quaternion(q)
-    # R = Ry(a) Rx(b) Rz(c): column 2 is (sin a cos b, -sin b, cos a cos b), row 1 (cos b sin c, cos b cos c, -sin b)
-    return np.array(
-        [np.arctan2(R[0, 2], R[2, 2]), np.arcsin(np.clip(-R[1, 2], -1.0, 1.0)), np.arctan2(R[1, 0], R[1, 1])]
-    )
-
-
 def _add_ball(robot: ElementTree.Element, joint: Joint) -> None:
     parent, position, orientation = joint.parent, joint.position, joint.orientation
-    for index, (letter, axis) in enumerate(BALL_AXES):
-        last = index == len(BALL_AXES) - 1
+    for index, (letter, axis) in enumerate(AXES):
+        last = index == len(AXES) - 1
         child = joint.child if last else f"{joint.child}_{letter}"
         name = f"{joint.name}_{letter}"
         _add_joint(robot, Joint(name, JointKind.REVOLUTE, parent, child, position, orientation, axis))

@@ -74,6 +74,13 @@ class Empty(Message):
 
 
 @message("std_msgs")
+class Float64(Message):
+    """A number."""
+
+    data: float64 = 0.0
+
+
+@message("std_msgs")
 class MultiArrayDimension(Message):
     """One dimension of an array: label, size, stride."""
 
@@ -172,6 +179,22 @@ class Transform(Message):
 
     translation: Vector3 = field(default_factory=Vector3)
     rotation: Quaternion = field(default_factory=Quaternion)
+
+
+@message("geometry_msgs")
+class TransformStamped(Message):
+    """Where `child_frame_id` is in the header's frame."""
+
+    header: Header = field(default_factory=Header)
+    child_frame_id: string = ""
+    transform: Transform = field(default_factory=Transform)
+
+
+@message("tf2_msgs")
+class TFMessage(Message):
+    """Several frames, as the transform tree takes them."""
+
+    transforms: Sequence[TransformStamped] = ()
 
 
 @message("geometry_msgs")

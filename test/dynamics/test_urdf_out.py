@@ -11,9 +11,10 @@ from physics_prior.effects.gravity import Gravity
 from physics_prior.errors import ModelError
 from physics_prior.inertia import rod
 from physics_prior.model import Joint, JointKind, Part, Tree
+from physics_prior.model.ball_hinges import AXES, hinge_angles
 from physics_prior.model.human import Human
 from physics_prior.model.urdf import tree_from_urdf
-from physics_prior.model.urdf_out import BALL_AXES, ball_angles, urdf_from_tree
+from physics_prior.model.urdf_out import urdf_from_tree
 
 
 def person() -> Tree:
@@ -41,8 +42,8 @@ def test_a_person_reads_back_and_moves_the_same():
             q_back[link.q], v_back[link.v] = q[:7], v[:6]
         elif name[:-2] in [joint.name for joint in tree.joints] and name[-2:] in ("_y", "_x", "_z"):
             ball = tree.link(name[:-2])
-            which = [letter for letter, _ in BALL_AXES].index(name[-1])
-            a, b, c = ball_angles(q[ball.q])
+            which = [letter for letter, _ in AXES].index(name[-1])
+            a, b, c = hinge_angles(q[ball.q])
             Rx, Rz = (
                 rotations.matrix_from_quaternion(rotations.exp(t * e))
                 for t, e in ((b, np.eye(3)[0]), (c, np.eye(3)[2]))

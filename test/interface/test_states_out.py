@@ -38,9 +38,10 @@ def test_every_message_has_stamp_and_frame_and_survives_the_codec(published):
 def test_joint_states_and_their_deviations(published, every_joint_simulator):
     messages, estimate = published
     states, deviations = messages["joint_states"], messages["joint_states/stddev"]
-    assert tuple(states.name) == tuple(deviations.name) == ("elbow-1", "elbow.1")
+    names = ("elbow-1", "elbow.1", "shoulder_y", "shoulder_x", "shoulder_z")
+    assert tuple(states.name) == tuple(deviations.name) == names
     nv = every_joint_simulator.nv
-    for index, name in enumerate(states.name):
+    for index, name in enumerate(names[:2]):
         q, v = place(every_joint_simulator, name)
         assert states.position[index] == estimate.q[q][0]
         assert states.velocity[index] == estimate.v[v][0]
@@ -50,6 +51,83 @@ def test_joint_states_and_their_deviations(published, every_joint_simulator):
         assert deviations.velocity[index] ** 2 == pytest.approx(estimate.covariance[row, row], rel=1e-14)
     assert len(deviations.effort) == 0
     assert deviations.header == states.header
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_hinges_of_a_ball_joint_are_its_own_motion_and_uncertainty(
+    every_joint, every_joint_simulator, estimate_of, seed
+):
+    simulator, output = every_joint_simulator, Output(every_joint, every_joint_simulator)
+    estimate = estimate_of(simulator, seed)
+    q, v = place(simulator, "shoulder")
+    nv, h, own = simulator.nv, 1e-6, np.r_[v, simulator.nv + np.r_[v]]
+
+    def said(estimate):
+        states = dict(output.states(estimate))["joint_states"]
+        return np.concatenate([states.position[2:], states.velocity[2:]])
+
+    def moved(error):
+        tangent = np.zeros(2 * nv)
+        tangent[own] = error
+        there = simulator.displaced(estimate.q, tangent[:nv])
+        return said(estimate_of(simulator, seed, q=there, v=estimate.v + tangent[nv:]))
+
+    here, states = said(estimate), dict(output.states(estimate))["joint_states"]
+    a, b, c = (rotations.exp(angle * axis) for angle, axis in zip(here[:3], np.eye(3)[[1, 0, 2]], strict=True))
+    turn = rotations.multiply(rotations.multiply(a, b), c)
+    np.testing.assert_allclose(
+        rotations.matrix_from_quaternion(turn), rotations.matrix_from_quaternion(estimate.q[q]), atol=1e-14
+    )
+    J = np.stack([(moved(h * e) - moved(-h * e)) / (2 * h) for e in np.eye(6)], axis=1)
+    np.testing.assert_allclose(J[:3, :3] @ estimate.v[v], here[3:], rtol=1e-6)  # rates are how the angles change
+    assert states.effort[2:] @ here[3:] == pytest.approx(estimate.effort[v] @ estimate.v[v], rel=1e-12)  # as is power
+    deviations = dict(output.states(estimate))["joint_states/stddev"]
+    expected = np.sqrt(np.diag(J @ estimate.covariance[np.ix_(own, own)] @ J.T))
+    np.testing.assert_allclose(np.concatenate([deviations.position[2:], deviations.velocity[2:]]), expected, rtol=1e-5)
+
+
+def test_hinges_stay_finite_where_they_are_singular(every_joint, every_joint_simulator, estimate_of):
+    estimate = estimate_of(every_joint_simulator)
+    q, _ = place(every_joint_simulator, "shoulder")
+    estimate.q[q] = rotations.exp(np.array([0.5 * np.pi, 0.0, 0.0]))
+    messages = dict(Output(every_joint, every_joint_simulator).states(estimate))
+    for message in (messages["joint_states"], messages["joint_states/stddev"]):
+        assert np.isfinite(message.position).all()
+        assert np.isfinite(message.velocity).all()
+
+
+def test_transforms_tell_where_the_root_of_the_urdf_is(published):
+    messages, _ = published
+    (transform,), pose = messages["/tf"].transforms, messages["odometry"].pose.pose
+    assert (transform.header.frame_id, transform.child_frame_id) == ("lab", "base")
+    assert array_of(transform.transform.translation).tolist() == array_of(pose.position).tolist()
+    assert transform.transform.rotation == pose.orientation
+
+
+def test_centre_of_mass_and_energy_are_those_of_all_parts(every_joint, every_joint_simulator, estimate_of):
+    simulator, output = every_joint_simulator, Output(every_joint, every_joint_simulator)
+    estimate, h, nv = estimate_of(simulator), 1e-6, every_joint_simulator.nv
+
+    def center(q):
+        return array_of(dict(output.states(estimate_of(simulator, q=q)))["center_of_mass"].pose.pose.position)
+
+    message = dict(output.states(estimate))["center_of_mass"]
+    total, moment = 0.0, np.zeros(3)
+    for part in simulator.tree.parts:
+        origin, R = simulator.pose(part.name)
+        total += part.mass_properties.mass
+        moment += part.mass_properties.mass * (origin + R @ part.mass_properties.center_of_mass)
+    np.testing.assert_allclose(array_of(message.pose.pose.position), moment / total, atol=1e-14)
+    columns = [
+        (center(simulator.displaced(estimate.q, h * e)) - center(simulator.displaced(estimate.q, -h * e))) / (2 * h)
+        for e in np.eye(nv)
+    ]
+    J = np.stack(columns, axis=1)
+    covariance = np.reshape(message.pose.covariance, (6, 6))
+    np.testing.assert_allclose(covariance[:3, :3], J @ estimate.covariance[:nv, :nv] @ J.T, rtol=1e-6, atol=1e-9)
+    assert not covariance[3:].any()
+    simulator.move(estimate.q, estimate.v)
+    assert dict(output.states(estimate))["energy"].data == simulator.energy()
 
 
 def test_multi_dof_joints_tell_transform_twist_and_wrench(published, every_joint_simulator):

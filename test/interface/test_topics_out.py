@@ -16,8 +16,8 @@ from physics_prior.scene import load_scene
 
 def test_a_scene_has_no_topic_for_what_it_has_not():
     pendulum, free, four_bar = (set(topics_of(load_scene(name))) for name in ("pendulum", "free_body", "four_bar"))
-    always = {"state_covariance", "markers", "/diagnostics"}
-    assert free == always | {"multi_dof_joint_states", "odometry"}
+    always = {"center_of_mass", "energy", "state_covariance", "markers", "/diagnostics"}
+    assert free == always | {"multi_dof_joint_states", "odometry", "/tf"}
     (force,) = (topic for topic in pendulum if topic.startswith("constraint_forces/") and not topic.endswith("stddev"))
     assert pendulum == always | {"joint_states", "joint_states/stddev", force, f"{force}/stddev"}
     assert {"constraint_forces/ground_pin", "constraint_forces/ground_pin/stddev"} <= four_bar

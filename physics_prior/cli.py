@@ -20,6 +20,7 @@ COMMANDS = {
     "calibrate": ("physics_prior.commands.calibrate", "fit a person to a trial of markers, and write its scene"),
     "simulate": ("physics_prior.commands.simulate", "record a bag of a scene: noisy measurements and the truth"),
     "replay": ("physics_prior.commands.replay", "estimate motion and forces from a recording"),
+    "plot": ("physics_prior.commands.plot", "draw joints, forces and figures of a recording"),
     "effects": ("physics_prior.commands.effects", "tell which effects a recording calls for, and fit their numbers"),
     "stability": ("physics_prior.commands.stability", "run the hard cases on which engines break"),
     "accuracy": ("physics_prior.commands.accuracy", "measure what accuracy costs in time, beside other engines"),

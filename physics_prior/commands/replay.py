@@ -23,11 +23,18 @@ LONGEST_LAG = 3600.0  # s
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the arguments of `replay`."""
-    parser.add_argument("bag", metavar="BAG", type=Path, help="the recording: a rosbag2 folder or an .mcap file")
-    parser.add_argument("--scene", required=True, help="a scene file, or the name of a shipped scene")
+    add_estimation(parser)
     parser.add_argument(
         "-o", "--output", metavar="OUTBAG", type=Path, help="a bag to write, with the topics that the node publishes"
     )
+    parser.add_argument("--plot", metavar="FILE", help="draw the readouts: .png, .svg or .pdf; see also `plot`")
+    parser.add_argument("--json", metavar="FILE", help="write the figures as JSON; - prints that and nothing else")
+
+
+def add_estimation(parser: argparse.ArgumentParser) -> None:
+    """Describe what is estimated, how, and what it is compared with."""
+    parser.add_argument("bag", metavar="BAG", type=Path, help="the recording: a rosbag2 folder or an .mcap file")
+    parser.add_argument("--scene", required=True, help="a scene file, or the name of a shipped scene")
     told = parser.add_mutually_exclusive_group()
     told.add_argument("--smooth", action="store_true", help="estimate every moment from the whole recording")
     told.add_argument(
@@ -52,8 +59,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="a JointState topic of the bag to compare with, or a WrenchStamped of a force plate; may be repeated",
     )
-    parser.add_argument("--plot", metavar="FILE", help="draw the estimates: .png, .svg or .pdf")
-    parser.add_argument("--json", metavar="FILE", help="write the figures as JSON; - prints that and nothing else")
 
 
 def lag(text: str) -> float:

@@ -83,14 +83,14 @@ def require_folder(option: str, target: str | None) -> None:
         raise PhysicsPriorError(f"{option} {target}: folder {folder} is not writable")
 
 
-def require_plot_folder(path: Path) -> None:
+def require_plot_folder(path: Path, option: str = "--plot") -> None:
     """Make the folder for pictures, or refuse before any work."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise PhysicsPriorError(f"--plot {path}: {error.strerror}; give a folder") from None
+        raise PhysicsPriorError(f"{option} {path}: {error.strerror}; give a folder") from None
     if not os.access(path, os.W_OK):
-        raise PhysicsPriorError(f"--plot {path}: folder is not writable")
+        raise PhysicsPriorError(f"{option} {path}: folder is not writable")
 
 
 def write_json(target: str, data: Mapping[str, Any]) -> None:

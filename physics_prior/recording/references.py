@@ -36,6 +36,21 @@ def read_references(reader: BagReader, topics: Sequence[str], scene: Scene) -> t
     return joints, plates
 
 
+def plates_of(reader: BagReader, scene: Scene) -> list[str]:
+    """The topics of force plates: every WrenchStamped that the scene neither measures nor names as another force than the ground's."""
+    ground = {name for effect in scene.effects for name in effect.footings(scene.tree)}
+    others = [f"/{topic}" for name, topic in force_topics(scene).items() if name not in ground]
+    measured = [source.topic for source in scene.measurements]
+    return [
+        topic
+        for topic, kind in reader.topics.items()
+        if ground
+        and kind.type == WrenchStamped.ros_type
+        and topic not in measured
+        and not topic.endswith((*others, "/stddev"))
+    ]
+
+
 def _joints(reader: BagReader, topic: str) -> Reference:
     """A JointState topic as a reference; velocities that are missing are NaN."""
     stamps, positions, velocities = [], [], []

@@ -25,6 +25,7 @@ from physics_prior.estimation.lagged import WHOLE, Lagged
 from physics_prior.estimation.readout import deviations, evaluate, measured_acceleration, unit
 from physics_prior.estimation.score import FROM_SECONDS, Score
 from physics_prior.interface import Output, take_in
+from physics_prior.model.coordinates import coordinate_errors
 from physics_prior.recording.reader import BagReader, open_bag
 from physics_prior.recording.references import read_references
 from physics_prior.recording.writer import BagWriter
@@ -46,6 +47,7 @@ class ReplayResult:
         scene: what was estimated; lag: s after each estimate that measurements told it, infinite for all of them.
         epoch: stamp of the first estimate, ns; all other times count from it.
         stamps: (k,) seconds.
+        q: (k, nq) configurations; spread: (k, nv) standard deviations of their coordinates (model/coordinates.py).
         readouts, deviations: readout name -> (k,) or (k, 3); values and standard deviations; units by name.
         health: (k,) Level.
         reference_stamps, reference: (r,) seconds, and readout name -> (r,) or (r, 3) at the reference state, where one fixes it.
@@ -53,7 +55,7 @@ class ReplayResult:
         gated, topics: (n,) whether the gate refused it, and where it came from.
         counts: what became of the measurements; loss: what a damaged bag lost, or None.
         score: errors against the references (Score.summary, and ``forces`` by Comparison.figures), or None.
-        forces: what the ground does against force plates, by name (ForceScore).
+        forces, weight: what the ground does against force plates, by name (ForceScore), and the model's weight, N.
         span_s, wall_s, health_s: seconds of the recording, of the replay, and in each health.
     """
 
@@ -63,6 +65,8 @@ class ReplayResult:
     counts: Counts = field(default_factory=Counts)
     loss: str | None = None
     stamps: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    q: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    spread: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     readouts: dict[str, np.ndarray] = field(default_factory=dict)
     deviations: dict[str, np.ndarray] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
@@ -76,6 +80,7 @@ class ReplayResult:
     topics: list[str] = field(default_factory=list)
     score: dict[str, Any] | None = None
     forces: dict[str, Comparison] = field(default_factory=dict)
+    weight: float = 0.0
     span_s: float = 0.0
     wall_s: float = 0.0
     health_s: dict[str, float] = field(default_factory=dict)
@@ -158,6 +163,7 @@ class _Replay:
         self.lagged = Lagged(self.estimator, WHOLE if math.isinf(lag) else round(lag * NANOSECONDS), self.period)
         self.result = ReplayResult(scene, lag, loss=self.reader.loss)
         self.rows: list[tuple[int, int, dict[str, np.ndarray], dict[str, np.ndarray]]] = []
+        self.motion: list[tuple[np.ndarray, np.ndarray]] = []
         self.true: list[tuple[int, dict[str, np.ndarray]]] = []
         self.innovations: list[tuple[int, float, int, bool, str]] = []
         self.first_stamp: int | None = None
@@ -224,6 +230,8 @@ class _Replay:
         values = evaluate(self.scene.readouts, self.simulator, state.q, state.v, vdot)
         spread = deviations(self.scene.readouts, self.simulator, self.process, posterior)
         self.rows.append((posterior.stamp, int(health.level), values, spread))
+        errors = coordinate_errors(self.scene.tree, state.q, posterior.factor[: self.simulator.nv])
+        self.motion.append((state.q.copy(), np.linalg.norm(errors, axis=1)))
         settled = posterior.stamp - self.first_stamp >= FROM_SECONDS * NANOSECONDS
         if settled:
             self._compare(posterior, vdot)
@@ -283,6 +291,7 @@ class _Replay:
         result.epoch = self.first_stamp
         result.stamps = (stamps - self.first_stamp) / NANOSECONDS
         result.health = np.array([row[1] for row in self.rows])
+        result.q, result.spread = (np.array(each) for each in zip(*self.motion, strict=True))
         for readout in self.scene.readouts:
             result.readouts[readout.name] = np.array([row[2][readout.name] for row in self.rows])
             result.deviations[readout.name] = np.array([row[3][readout.name] for row in self.rows])
@@ -310,7 +319,8 @@ class _Replay:
                 }
         if self.force_score is not None:
             result.forces = self.force_score.comparisons()
-            figures = {name: each.figures(self.force_score.weight) for name, each in result.forces.items()}
+            result.weight = self.force_score.weight
+            figures = {name: each.figures(result.weight) for name, each in result.forces.items()}
             result.score = {"from_s": FROM_SECONDS, **(result.score or {}), "forces": figures}
 
 

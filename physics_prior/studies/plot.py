@@ -122,13 +122,13 @@ def _readout(result: ReplayResult, name: str, order: np.ndarray, left: Axes, rig
             left.plot(stamps, scale * (value - error), color=REFERENCE, **UNDERLAY)
             right.plot(stamps, error_scale * error, color=color, lw=0.8)
     typical = np.median(spread, axis=0)
-    _limit(left, scale * np.concatenate([values - typical, values + typical]))
+    limit(left, scale * np.concatenate([values - typical, values + typical]))
     largest = error_scale * MARGIN * max(float(np.percentile(spread, SETTLED)), worst)
     right.set_ylim(-largest or -1e-3, largest or 1e-3)
     if values.shape[1] == 3 or reference is not None:
         if reference is not None:
             left.plot([], [], color=REFERENCE, **UNDERLAY, label="reference")
-        _legend(left)
+        legend(left)
     left.set_ylabel(f"{name}\n[{unit}]", fontsize=8)
     right.set_ylabel(f"[{error_unit}]", fontsize=8)
 
@@ -172,7 +172,7 @@ def _innovations(result: ReplayResult, axes: Axes) -> None:
         axes.plot(at, mean, color=LINES[0], lw=1.4, label=f"mean over {WINDOW:g} s")
         axes.axhline(1.0, color=REFERENCE, lw=0.6)
         axes.set_ylim(0.0, max(2.5, 1.2 * float(np.nanpercentile(mean, 98))))
-        _legend(axes)
+        legend(axes)
     axes.set_ylabel("NIS /\nexpected", fontsize=8)
     axes.set_title("normalised innovations squared: 1 where model and noise are right", loc="left", fontsize=9)
 
@@ -193,21 +193,21 @@ def _health(result: ReplayResult, axes: Axes) -> None:
     handles: list[Artist] = [Patch(color=HEALTH[level], label=level.name) for level in seen]
     handles += axes.plot([], [], "|", color=GATED, ms=5, mew=1.1, label=f"{len(gated)} gated")
     axes.set_xlabel("time [s]", fontsize=8)
-    _legend(axes, handles)
+    legend(axes, handles)
 
 
 def _columns(values: np.ndarray) -> np.ndarray:
     return values.reshape(len(values), -1)
 
 
-def _limit(axes: Axes, values: np.ndarray) -> None:
+def limit(axes: Axes, values: np.ndarray) -> None:
     """Show what most of the values need: not the uncertainty of the first moment, which dwarfs all else."""
     low, high = np.percentile(values, [EDGE, 100.0 - EDGE])
     margin = (MARGIN - 1.0) * (high - low) or 1e-3 * max(1.0, abs(high))
     axes.set_ylim(low - margin, high + margin)
 
 
-def _legend(axes: Axes, handles: Sequence[Artist] | None = None) -> None:
+def legend(axes: Axes, handles: Sequence[Artist] | None = None) -> None:
     """A legend above the axes, at the right, where it covers nothing."""
     place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.97), "borderaxespad": 0.0}
     shown = handles or axes.get_legend_handles_labels()[0]

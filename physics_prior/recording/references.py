@@ -37,7 +37,7 @@ def read_references(reader: BagReader, topics: Sequence[str], scene: Scene) -> t
 
 
 def plates_of(reader: BagReader, scene: Scene) -> list[str]:
-    """The topics of force plates: every WrenchStamped that the scene neither measures nor names as another force than the ground's."""
+    """The topics of force plates: each WrenchStamped that is neither measured nor named as a force other than the ground's."""
     ground = {name for effect in scene.effects for name in effect.footings(scene.tree)}
     others = [f"/{topic}" for name, topic in force_topics(scene).items() if name not in ground]
     measured = [source.topic for source in scene.measurements]

@@ -21,6 +21,8 @@ FRAMES = 9  # of the figures
 SIDES = {"left": LINES[0], "right": LINES[1], "": "#555555"}
 """Colours by the side that a part's name begins with."""
 FAINTEST = 0.25  # opacity of the first figure; the last one's is 1
+APART = 0.03  # of all that is drawn: moments that are nearer are not all told
+FAR = 0.7  # of the longest way
 SHORT = 1e-3  # of the model's size: a stick that would not be seen
 
 
@@ -33,7 +35,8 @@ def plot_joints(result: ReplayResult, path: Path) -> None:
     require_format(path)
     tree = result.scene.tree
     panels = _panels(tree)
-    rows = math.ceil(len(panels) / COLUMNS)
+    columns = min(COLUMNS, len(panels))
+    rows = math.ceil(len(panels) / columns)
     figure = Figure(figsize=(13.0, 1.0 + 1.9 * rows), dpi=110, layout="constrained")
     order = np.argsort(result.stamps, kind="stable")
     order = order[:: 1 + len(order) // MOST_POINTS]
@@ -41,7 +44,7 @@ def plot_joints(result: ReplayResult, path: Path) -> None:
     values = np.array([coordinates(tree, q) for q in result.q[order]])
     spread = SIGMAS * result.spread[order]
     for index, (title, unit, scale, freedoms) in enumerate(panels):
-        axes = figure.add_subplot(rows, COLUMNS, index + 1, xlim=(stamps[0], stamps[-1]))
+        axes = figure.add_subplot(rows, columns, index + 1, xlim=(stamps[0], stamps[-1]))
         shown = []
         for color, (label, column) in zip(LINES, freedoms, strict=False):
             value = np.unwrap(values[:, column]) if unit == "deg" else values[:, column]
@@ -52,9 +55,10 @@ def plot_joints(result: ReplayResult, path: Path) -> None:
         limit(axes, scale * np.concatenate(shown))
         if len(freedoms) > 1:
             legend(axes)
-        axes.set_title(title.replace("_", " "), loc="left", fontsize=8)
+        typical = scale * float(np.median(spread[:, [column for _, column in freedoms]]))
+        axes.set_title(f"{title.replace('_', ' ')}, ±{typical:.2g} {unit}", loc="left", fontsize=8)
         axes.set_ylabel(f"[{unit}]", fontsize=7)
-        if index >= len(panels) - COLUMNS:
+        if index >= len(panels) - columns:
             axes.set_xlabel("time [s]", fontsize=7)
         _quiet(axes)
     _finish(figure, result, f"joints \u00b1{SIGMAS:g} standard deviations", path)
@@ -68,15 +72,15 @@ def plot_forces(result: ReplayResult, path: Path) -> None:
     for row, (name, comparison) in enumerate(result.forces.items()):
         figures = comparison.figures(result.weight)
         stamps = (comparison.stamps - result.epoch) * 1e-9
-        gaps = np.flatnonzero(np.diff(stamps) > 1.5 * np.median(np.diff(stamps))) + 1 if len(stamps) > 1 else []
+        between = np.diff(stamps)
+        gaps = np.flatnonzero(between > 1.5 * np.median(between)) + 1 if len(between) else np.zeros(0, dtype=int)
         for column, component in enumerate(COMPONENTS):
             axes = figure.add_subplot(count, 3, 3 * row + column + 1)
             for forces, style in (
                 (comparison.measured, {"color": REFERENCE, **UNDERLAY, "label": "plate"}),
                 (comparison.estimated, {"color": LINES[0], "lw": 1.1, "label": "estimate"}),
             ):
-                own = np.insert(forces[:, column], gaps, np.nan)
-                axes.plot(np.insert(stamps, gaps, np.nan), own, **style)
+                axes.plot(np.insert(stamps, gaps, np.nan), np.insert(forces[:, column], gaps, np.nan), **style)
             own = figures[component]
             told = [f"RMSE {own['percent_weight']:.2g} % of weight"]
             if own["rrmse_percent"] is not None:
@@ -101,6 +105,7 @@ def plot_figures(result: ReplayResult, path: Path) -> None:
     bodies = [_sticks(result.scene.tree, q) for q in result.q[chosen]]
     ends = np.array([[stick[1:] for stick in body] for body in bodies])  # (frames, sticks, 2, 3)
     across = _across(ends)
+    tips, size, told = _tips(ends), float(np.ptp(ends.reshape(-1, 3), axis=0).max()), list[tuple[float, float]]()
     figure = Figure(figsize=(13.0, 5.5), dpi=110, layout="constrained")
     axes = figure.add_subplot(aspect="equal", adjustable="datalim")
     for frame, body in enumerate(bodies):
@@ -108,17 +113,17 @@ def plot_figures(result: ReplayResult, path: Path) -> None:
         for side, begin, end in body:
             line = np.array([begin, end])
             axes.plot(line @ across, line[:, 2], color=SIDES[side], alpha=opacity, lw=2.0, solid_capstyle="round")
-        low = ends[frame, :, :, 2].max()
-        place = (ends[frame] @ across).mean()
-        axes.annotate(
-            f"{result.stamps[chosen[frame]]:.2f} s",
-            (place, low),
-            xytext=(0, 5),
-            textcoords="offset points",
-            ha="center",
-            fontsize=6,
-            alpha=opacity,
-        )
+        place = tips[frame] @ across, tips[frame, 2]
+        if all(math.dist(place, other) > APART * size for other in told):
+            told.append(place)
+            axes.annotate(
+                f"{result.stamps[chosen[frame]]:.2f} s",
+                place,
+                xytext=(0, 5),
+                textcoords="offset points",
+                ha="center",
+                fontsize=6,
+            )
     sides = {side for side, _, _ in bodies[0]}
     if len(sides) > 1:
         handles = [Line2D([], [], color=SIDES[side], label=side or "middle") for side in SIDES if side in sides]
@@ -178,6 +183,14 @@ def _across(ends: np.ndarray) -> np.ndarray:
     return np.array([*(axes[0] if axes[0] @ way >= 0.0 else -axes[0]), 0.0])
 
 
+def _tips(ends: np.ndarray) -> np.ndarray:
+    """(frames, 3) m of each figure's highest end among those that go far."""
+    points = ends.reshape(len(ends), -1, 3)
+    far = np.ptp(points, axis=0).max(axis=1)
+    heights = np.where(far >= FAR * far.max(), points[..., 2].mean(axis=0), -np.inf)
+    return np.asarray(points[:, int(np.argmax(heights))])
+
+
 def _quiet(axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="#000000", alpha=0.08, lw=0.6)
@@ -185,5 +198,5 @@ def _quiet(axes: Axes) -> None:
 
 
 def _finish(figure: Figure, result: ReplayResult, what: str, path: Path) -> None:
-    figure.suptitle(f"{result.scene.name}: {result.kind} estimate, {what}", x=0.012, ha="left", fontsize=11)
+    figure.suptitle(f"{result.scene.name}, {result.kind}: {what}", x=0.012, ha="left", fontsize=11)
     figure.savefig(path)

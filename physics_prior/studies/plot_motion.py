@@ -119,7 +119,7 @@ def plot_figures(result: ReplayResult, path: Path) -> None:
             axes.annotate(
                 f"{result.stamps[chosen[frame]]:.2f} s",
                 place,
-                xytext=(0, 5),
+                xytext=(0, 5 if tips[frame, 2] > ends[frame, ..., 2].mean() else -10),
                 textcoords="offset points",
                 ha="center",
                 fontsize=6,

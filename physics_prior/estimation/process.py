@@ -1,8 +1,8 @@
 """Process models: how the state goes on between measurements, and how surely.
 
-``PhysicsProcess`` is the scene's own step, its noise an unknown force. ``KinematicProcess`` knows no physics but that
-acceleration changes slowly (constant acceleration, white jerk: Bar-Shalom 2001, ch. 6.2.3); it is what physics is
-measured against.
+``PhysicsProcess`` is the scene's own step, its noise an unknown force; ``FrozenProcess`` differentiates it less often.
+``KinematicProcess`` knows no physics but that acceleration changes slowly (constant acceleration, white jerk: Bar-Shalom 2001,
+ch. 6.2.3); it is what physics is measured against.
 """
 
 import math
@@ -141,6 +141,19 @@ class PhysicsProcess(_OnManifold):
         return np.hstack([self._own_noise, self._effects_noise.columns(state.q, state.v)])
 
 
+class FrozenProcess(PhysicsProcess):
+    """The same steps, but derivatives only once from measurement to measurement: those of one step over all of it."""
+
+    def predict(self, state: State, factor: np.ndarray, h: float, count: int) -> np.ndarray:
+        if count == 1 or len(self.simulator.candidates):
+            return super().predict(state, factor, h, count)
+        ahead, begin = state.copy(), self.simulator.time
+        factor = carry(self.simulator, ahead.q, ahead.v, count * h, 1, factor, self._noise(state))
+        self.simulator.time = begin
+        self.simulator.advance(state.q, state.v, h, count)
+        return factor
+
+
 class KinematicProcess(_OnManifold):
     """Constant acceleration of every degree of freedom, driven by white jerk; knows neither mass nor constraint."""
 
@@ -167,6 +180,7 @@ class KinematicProcess(_OnManifold):
 
 PROCESSES: dict[str, Callable[[Scene, Simulator], Process]] = {
     "physics": PhysicsProcess,
+    "frozen": FrozenProcess,
     "kinematic": KinematicProcess,
 }
 """The process models, by the name that ``--process`` knows them by."""

@@ -14,12 +14,20 @@ from physics_prior.studies.plot import require_format
 COLORS = {
     "rk4": "#0072b2",
     "semi_implicit_euler": "#d55e00",
+    "derivatives once": "#56b4e9",
     "no physics": "#999999",
     "fewer measurements": "#cc79a7",
     "smoothed, later by": "#009e73",
 }
 """By series: told apart by all kinds of colour vision (Okabe and Ito)."""
-ABOVE = {"rk4": -9, "semi_implicit_euler": 5, "no physics": 5, "fewer measurements": 12, "smoothed, later by": 5}
+ABOVE = {
+    "rk4": -9,
+    "semi_implicit_euler": 5,
+    "derivatives once": -16,
+    "no physics": 5,
+    "fewer measurements": 12,
+    "smoothed, later by": 5,
+}
 """Points that a label stands above its dot."""
 ROWS = (
     ("rmse_deg", "error of angles [deg]"),

@@ -12,9 +12,8 @@ from rich.table import Table
 from physics_prior.errors import PhysicsPriorError
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.estimation.filter import Posterior
-from physics_prior.estimation.history import Node
+from physics_prior.estimation.lagged import Lagged
 from physics_prior.estimation.measurement import Measurement
-from physics_prior.estimation.smoother import smooth
 from physics_prior.estimation.square_root import normalised_error
 from physics_prior.model import JointKind
 from physics_prior.recording.replay import replay
@@ -25,7 +24,7 @@ from physics_prior.studies.estimator.variants import PROBLEMS, STEPS, VARIANTS, 
 from physics_prior.studies.moving_human import moments
 
 SECONDS, SETTLED = 8.0, 0.4  # s, and s of the beginning that do not count
-SMOOTHED_EVERY = 10  # stamps: of what a lag is for, a sample
+WARMING = 8  # stamps that compile what is not yet
 FOREVER = 1e6  # s
 PAYING = 1.02  # times the errors of the most accurate steps: within it, noise is all that is left
 
@@ -35,7 +34,7 @@ class Point:
     """What a variant costs and gives on a problem.
 
     Attributes:
-        us: microseconds of the processor a measurement, the median, and what smoothing adds at every stamp.
+        us: microseconds of the processor a measurement, the median.
         rmse_deg: of all turning freedoms, deg.
         consistency: normalised estimation error squared over its degrees of freedom, or, of a recording, innovation squared
             (NIS) over its expectation: 1 where the covariance is right.
@@ -73,30 +72,35 @@ def run_study(names: Sequence[str], seed: int, progress: Callable[[float], None]
 def measure(name: str, scene: Scene, variant: Variant, recording: Sequence[Moment]) -> Point:
     """Run one variant on a recording."""
     measured = recording[:: variant.every]
-    estimator, us = _timed(scene, variant, [moment.measurements for moment in measured])
-    last, smoothing = {node.measurement.stamp: node.posterior for node in estimator.history.nodes}, 0.0
-    if variant.lag > 0.0:
-        start = thread_time_ns()
-        last = _smoothed(estimator, variant.lag)
-        smoothing = (thread_time_ns() - start) / 1e3 / len(last) / len(measured[0].measurements)
+    estimator, last, us = _timed(scene, variant, [moment.measurements for moment in measured])
     true = {moment.stamp: moment for moment in measured}
     begun = recording[0].stamp + round(SETTLED * 1e9)
     pairs = [(true[stamp], posterior) for stamp, posterior in last.items() if stamp >= begun]
     rmse, nees, force = _errors(estimator, pairs)
-    return Point(name, variant.series, variant.label, us + smoothing, rmse, nees, force)
+    return Point(name, variant.series, variant.label, us, rmse, nees, force)
 
 
-def _timed(scene: Scene, variant: Variant, stamps: Sequence[Sequence[Measurement]]) -> tuple[Estimator, float]:
-    """Feed an estimator what was measured, stamp by stamp; return it and the median of microseconds a measurement."""
-    times: list[float] = []
+def _timed(
+    scene: Scene, variant: Variant, stamps: Sequence[Sequence[Measurement]]
+) -> tuple[Estimator, dict[int, Posterior], float]:
+    """Feed an estimator what was measured, stamp by stamp.
+
+    Return it, the posterior of each stamp, told by its lag, and the median of microseconds a measurement.
+    """
     for warm in (True, False):  # what is not compiled yet is so the first time
         estimator, times = Estimator(variant.of(scene), variant.process, FOREVER), []
-        for measurements in stamps[:3] if warm else stamps:
+        lag = round(variant.lag * 1e9)
+        lagged = Lagged(estimator, lag, FOREVER)
+        told: dict[int, Posterior] = {}
+        for measurements in stamps[:WARMING] if warm else stamps:
             start = thread_time_ns()
             for measurement in measurements:
                 estimator.add(measurement)
+            if lag > 0:
+                told |= {each.stamp: each for each in lagged.due(measurements[-1].stamp)}
             times.append((thread_time_ns() - start) / 1e3 / len(measurements))
-    return estimator, float(np.median(times))
+    last = told if lag > 0 else {node.measurement.stamp: node.posterior for node in estimator.history.nodes}
+    return estimator, last, float(np.median(times))
 
 
 def run_recording(bag: Path, scene: Scene, reference: str, progress: Callable[[float], None]) -> list[Point]:
@@ -109,7 +113,7 @@ def run_recording(bag: Path, scene: Scene, reference: str, progress: Callable[[f
     variants = [*STEPS, Variant(process="kinematic")]
     for done, variant in enumerate(variants):
         figures = replay(bag, variant.of(scene), process=variant.process, references=[reference]).summary()
-        _, us = _timed(scene, variant, stamps)
+        _, _, us = _timed(scene, variant, stamps)
         score, nis = figures["reference"] or {}, figures["nis"]
         angles, forces = (_number(score.get(key)) for key in ("position_rmse_deg", "force_rmse_percent_weight"))
         consistency = nis["mean"] / nis["expected"] if nis["mean"] is not None else float("nan")
@@ -128,16 +132,6 @@ def _measured(bag: Path, scene: Scene) -> list[list[Measurement]]:
 
 def _number(value: float | None) -> float:
     return float("nan") if value is None else value
-
-
-def _smoothed(estimator: Estimator, lag: float) -> dict[int, Posterior]:
-    """Posteriors at a sample of the stamps, told by what was measured within the lag after them."""
-    nodes, out = estimator.history.nodes, {}
-    stamps = sorted({node.measurement.stamp for node in nodes})
-    for stamp in stamps[SMOOTHED_EVERY:-SMOOTHED_EVERY:SMOOTHED_EVERY]:
-        window: list[Node] = [node for node in nodes if stamp <= node.measurement.stamp <= stamp + round(lag * 1e9)]
-        out[stamp] = smooth(estimator.filter, window, FOREVER)[0]
-    return out
 
 
 def _errors(estimator: Estimator, pairs: Sequence[tuple[Moment, Posterior]]) -> tuple[float, float, float]:

@@ -33,7 +33,7 @@ class Variant:
             return "smoothed, later by"
         if self.every > 1:
             return "fewer measurements"
-        return self.integrator if self.process == "physics" else "no physics"
+        return {"physics": self.integrator, "frozen": "derivatives once", "kinematic": "no physics"}[self.process]
 
     @property
     def label(self) -> str:
@@ -50,6 +50,7 @@ class Variant:
 SIZES = (20e-3, 10e-3, 5e-3, 2e-3, 1e-3)
 STEPS = tuple(Variant(integrator, size) for integrator in ("semi_implicit_euler", "rk4") for size in SIZES)  # type: ignore[arg-type]
 OTHERS = (
+    *(Variant(size=size, process="frozen") for size in SIZES[1:]),
     Variant(process="kinematic"),
     *(Variant(every=every) for every in (2, 4)),
     *(Variant(lag=lag) for lag in (0.04, 0.1, 0.4)),

@@ -16,7 +16,8 @@ from physics_prior.model import Tree
 from physics_prior.scene import Scene, Step
 
 NANOSECONDS = 1e9
-MOST_SECONDS = 10.0  # of a scene's duration
+MOST_SECONDS, MOST_LOOKS = 10.0, 20_000  # of a scene's duration: s, and measurements
+LONGEST_RUN = 20.0  # s of processor time, beyond which a run is given up
 BRIEF = 1e-6  # s
 
 Observe = Callable[[Simulator, np.ndarray, np.ndarray], np.ndarray]
@@ -49,7 +50,7 @@ class Course:
 def course_of(scene: Scene) -> Course:
     """The scene's own motion from its initial state without noise, for 10 s at most, seen at its rate of measurements."""
     simulation, tree = scene.simulation, scene.tree
-    count = max(1, int(min(simulation.duration, MOST_SECONDS) * simulation.rate + 1e-9))
+    count = min(MOST_LOOKS, max(1, int(min(simulation.duration, MOST_SECONDS) * simulation.rate + 1e-9)))
     interval = 1.0 / simulation.rate
     marks = [_marks(part.mass_properties) for part in tree.parts]
     names = [part.name for part in tree.parts]
@@ -118,6 +119,8 @@ class Follower:
                 finally:
                     self.taken += thread_time() - begin
                     self.made += count
+                if self.taken > LONGEST_RUN:
+                    raise SimulationError(f"{time:g} s of motion take more than {LONGEST_RUN:g} s of processor time")
                 simulator.time = stretch.end / NANOSECONDS
                 simulator.switches.follow(stretch.events, q, v)
             now = following

@@ -189,6 +189,20 @@ def test_a_motion_that_is_not_known_long_enough_is_refused(load, monkeypatch):
         settle(scene)
 
 
+def test_what_takes_too_long_is_given_up(load, monkeypatch):
+    monkeypatch.setattr("physics_prior.stepping.course.LONGEST_RUN", 0.0)
+    with pytest.raises(
+        SceneError, match=r"bob.yaml: accuracy: the motion .* is lost: 0.05 s of motion take more than 0 s"
+    ):
+        settle(load())
+
+
+def test_a_rate_beyond_reason_shortens_the_motion_that_is_tried(load):
+    course = course_of(load(("rate: 20 Hz", "rate: 1 MHz")))
+    assert len(course.times) == 20_000
+    assert course.times[-1] == pytest.approx(0.02)
+
+
 @pytest.mark.slow
 def test_stiff_motion_has_its_own_contestants(load):
     """A damper of 1e4 N m s/rad on 1 kg m^2 loses Runge and Kutta's 50 ms; the implicit rules take them."""

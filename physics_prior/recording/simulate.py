@@ -80,7 +80,7 @@ def motion(
         measurements = []
         simulator.move(q, v)
         for source, noise in zip(scene.measurements, noises, strict=True):
-            measurements.append(_measure(source, simulator, q, v, stamp, noise))
+            measurements.append(measure(source, simulator, q, v, stamp, noise))
         yield Moment(stamp, q.copy(), v.copy(), measurements)
         following = EPOCH + round((k + 1) * NANOSECONDS / scene.simulation.rate)
         for stretch in simulator.switches.stretches(stamp - EPOCH, following - EPOCH) if k < count else ():
@@ -167,7 +167,7 @@ def _count(scene: Scene, seed: int, duration: float) -> int:
     return count
 
 
-def _measure(
+def measure(
     source: MeasurementSource,
     simulator: Simulator,
     q: np.ndarray,

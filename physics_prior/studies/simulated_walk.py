@@ -19,8 +19,9 @@ import numpy as np
 
 from physics_prior import rotations
 from physics_prior.dynamics.simulator import Simulator
+from physics_prior.estimation.measurement import Measurement
 from physics_prior.interface.geometry import header_of, wrench_of
-from physics_prior.model import Tree
+from physics_prior.interface.topics import JOINT_STATES, MULTI_DOF_JOINT_STATES
 from physics_prior.recording.messages import JointState, MultiDOFJointState, PoseArray, WrenchStamped
 from physics_prior.recording.simulate import EPOCH, measure, message_of
 from physics_prior.recording.truth import PREFIX, Truth
@@ -175,9 +176,7 @@ class Walk:
         turn = rotations.multiply(rotations.exp(sideways * x), rotations.exp(forward * y))
         q[self.tree.link(f"{side}_hip").q] = turn
         q[self.tree.link(f"{side}_knee").q] = bend
-        q[self.tree.link(f"{side}_ankle").q] = rotations.conjugate(
-            rotations.multiply(turn, rotations.exp(bend * y))
-        )
+        q[self.tree.link(f"{side}_ankle").q] = rotations.conjugate(rotations.multiply(turn, rotations.exp(bend * y)))
 
     def _state(self, time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """q, v and vdot at a time, by differences."""
@@ -207,7 +206,7 @@ class Walk:
             self._way += spectrum / (1.0 + omega**2 * self._standing / self._gravity)
 
 
-def moments(scene: Scene, walk: Walk, seed: int, duration: float) -> Iterator[tuple[int, Instant, list]]:
+def moments(scene: Scene, walk: Walk, seed: int, duration: float) -> Iterator[tuple[int, Instant, list[Measurement]]]:
     """Stamp, ns, truth, and what the scene's sources measure of it, at the scene's rate.
 
     Noise is drawn as ``recording.simulate`` does, from a PCG64 stream for each source.
@@ -233,29 +232,30 @@ def record(scene: Scene, out: Path, seed: int, duration: float) -> None:
     """
     simulator = scene.simulator()
     walk, truth = Walk(scene, simulator), Truth(scene, simulator)
-    joints, others = PREFIX + "joint_states", PREFIX + "multi_dof_joint_states"
     with BagWriter(out) as writer:
         for source in scene.measurements:
             writer.add_topic(source.topic, PoseArray)
-        writer.add_topic(joints, JointState)
-        writer.add_topic(others, MultiDOFJointState)
+        writer.add_topic(PREFIX + JOINT_STATES, JointState)
+        writer.add_topic(PREFIX + MULTI_DOF_JOINT_STATES, MultiDOFJointState)
         for side in SIDES:
             writer.add_topic(f"/force_plate/{side}", WrenchStamped)
         for stamp, instant, measured in moments(scene, walk, seed, duration):
             header = header_of(stamp, scene.frame_id)
             for each in measured:
                 writer.write(each.topic, message_of(each, scene.frame_id), stamp)
-            states = dict(truth.messages(stamp, instant.q, instant.v))
-            efforts = [instant.torques[scene.tree.link(name).v][0] for name in states[joints].name]  # type: ignore[attr-defined]
-            writer.write(joints, replace(states[joints], effort=np.array(efforts)), stamp)
-            writer.write(others, replace(states[others], wrench=()), stamp)
+            for topic, message in truth.messages(stamp, instant.q, instant.v):
+                if isinstance(message, JointState):
+                    efforts = [instant.torques[scene.tree.link(name).v][0] for name in message.name]
+                    writer.write(topic, replace(message, effort=np.array(efforts)), stamp)
+                elif isinstance(message, MultiDOFJointState):
+                    writer.write(topic, replace(message, wrench=()), stamp)
             for side, wrench in instant.wrenches.items():
                 writer.write(f"/force_plate/{side}", WrenchStamped(header, wrench_of(wrench[:3], wrench[3:])), stamp)
 
 
 def _pressure(force: np.ndarray, moment: np.ndarray) -> np.ndarray:
     """(2,) m, where the ground, z = 0, presses."""
-    return np.array([-moment[1], moment[0]]) / force[2]
+    return np.array([-moment[1] / force[2], moment[0] / force[2]])
 
 
 def _smooth(share: float) -> float:

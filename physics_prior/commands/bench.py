@@ -4,8 +4,9 @@ With --peers, Pinocchio and MuJoCo (their PyPI wheels, extra 'bench') take turns
 above 1 means that we are faster. Before anything is timed, the engines' results are compared. Then the estimator, predict and
 update with its covariance, on the same tree in motion: its split, and, where biorbd is installed, that one's Kalman filter.
 
-With --effects, each built-in effect is taken out of a copy of the program instead, and a scene that does not name it is compiled
-and run in both: the same bits, the same instructions. Takes some two to three minutes.
+With --effects, each built-in effect is taken out of a copy of the program instead, and scenes that do not name it are compiled
+and run in both: the same bits, the same instructions. Then scenes that name little and much are compiled from a cold cache and
+stepped. Takes some ten minutes.
 
 With --sleep, boxes at rest beside a pendulum are stepped with sleep and without.
 
@@ -63,14 +64,15 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _effects(args: argparse.Namespace) -> int:
-    from physics_prior.studies.effect_costs import run_effect_costs, table
+    from physics_prior.studies import effect_costs, scene_costs
 
     with progress("building and running") as report:
-        figures = run_effect_costs(progress=report)
+        figures = effect_costs.run_effect_costs(progress=report) | scene_costs.run_scene_costs(report)
     if args.json is not None:
         write_json(args.json, figures)
     if args.json != STDOUT:
-        console().print(table(figures), soft_wrap=True)
+        console().print(effect_costs.table(figures), soft_wrap=True)
+        console().print(scene_costs.table(figures), soft_wrap=True)
     return 0
 
 

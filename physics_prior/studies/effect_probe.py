@@ -1,23 +1,21 @@
 """One build, asked from outside: how a scene moves in it, by which machine code, and what it compiled for that.
 
-``python -m physics_prior.studies.effect_probe`` prints JSON. It names no effect, so that it runs in a build without any of
+``python -m physics_prior.studies.effect_probe SCENE`` prints JSON. It names no effect, so that it runs in a build without any of
 them (effect_costs.py).
 """
 
 import hashlib
 import json
 import re
+import sys
 from typing import Any
 
-import numpy as np
 from numba.core import event
 
-from physics_prior.dynamics.compose import step_source
-from physics_prior.dynamics.simulator import Simulator
-from physics_prior.inertia import box
-from physics_prior.model import Joint, JointKind, Part, Tree
+from physics_prior.dynamics.compose import kinds_of_rows, step_source
+from physics_prior.scene import Scene, load_scene
 
-STEPS, STEP_SIZE = 1000, 1e-3
+STEPS = 1000
 
 
 class Compiled(event.Listener):  # type: ignore[misc]
@@ -33,24 +31,6 @@ class Compiled(event.Listener):  # type: ignore[misc]
         """Nothing more is to be known."""
 
 
-def free_body() -> Tree:
-    """A brick in flight, that no effect acts on."""
-    return Tree([Part("brick", box(1.0, (0.1, 0.2, 0.3)))], [Joint("flight", JointKind.FREE, "world", "brick")])
-
-
-class Flight:
-    """A body on its way, stepped."""
-
-    def __init__(self) -> None:
-        self.simulator = Simulator(free_body())
-        self.v = np.array([1.0, 2.0, 3.0, 0.3, -4.0, 0.5])
-        self.q = self.simulator.tree.neutral()
-
-    def advance(self) -> None:
-        """Make STEPS steps from where it is."""
-        self.simulator.advance(self.q, self.v, STEP_SIZE, STEPS)
-
-
 def digest(data: bytes) -> str:
     """A short digest."""
     return hashlib.sha256(data).hexdigest()[:16]
@@ -62,23 +42,25 @@ def instructions(assembly: str) -> list[str]:
     return [line.strip() for line in lines if re.match(r"\s+[a-z]", line)]
 
 
-def main() -> None:
-    """Answer."""
+def answer(scene: Scene) -> dict[str, Any]:
+    """What STEPS steps from a scene's start come to, and what they took."""
     compiled = Compiled()
+    q, v = scene.initial.q.copy(), scene.initial.v.copy()
     with event.install_listener("numba:compile", compiled):
-        flight = Flight()
-        flight.advance()
-    (assembly,) = flight.simulator.step.advance.inspect_asm().values()
+        simulator = scene.simulator()
+        simulator.begin(q, v)
+        simulator.advance(q, v, scene.step.size, STEPS)
+    (assembly,) = simulator.step.advance.inspect_asm().values()
     code = instructions(assembly)
-    answer = {
-        "bits": digest(flight.q.tobytes() + flight.v.tobytes()),
-        "text": digest(step_source([], False, "rk4").encode()),
+    constrained, touching = kinds_of_rows(scene.tree, scene.effects)
+    return {
+        "bits": digest(q.tobytes() + v.tobytes()),
+        "text": digest(step_source(scene.effects, constrained, scene.step.integrator, touching).encode()),
         "code": digest("\n".join(code).encode()),
         "instructions": len(code),
         "modules": sorted(set(compiled.modules)),
     }
-    print(json.dumps(answer))
 
 
 if __name__ == "__main__":
-    main()
+    print(json.dumps(answer(load_scene(sys.argv[1]))))

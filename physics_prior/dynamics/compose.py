@@ -13,6 +13,7 @@ import importlib.util
 import os
 import sys
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 
@@ -44,11 +45,27 @@ TYPES = {name: numba.from_dtype(dtype)[::1] for name, dtype in RECORDS.items()} 
 
 
 def pack_parameters(tree: Tree, effects: Sequence[Effect]) -> np.ndarray:
-    """The numbers of a scene's step: gravity (3,), where each force effect's own begin (and the end), then they."""
-    gravity = np.sum([np.zeros(GRAVITY), *(effect.field() for effect in effects)], axis=0)
+    """The numbers of a scene's step: gravity (3,), where each force effect's own begin (and the end), they, and which act."""
     numbers = [effect.parameters(tree) for effect in effects if effect.compiled is not None]
     starts = GRAVITY + len(numbers) + 1 + np.cumsum([0, *(len(own) for own in numbers)])
-    return np.concatenate([gravity, starts, *numbers])
+    packed = np.concatenate([np.zeros(GRAVITY), starts, *numbers, np.zeros(len(numbers))])
+    set_acting(packed, effects, [True] * len(effects))
+    return packed
+
+
+def set_acting(parameters: np.ndarray, effects: Sequence[Effect], acting: Sequence[bool]) -> None:
+    """Write into the numbers of a scene's step which of its effects act."""
+    fields = [effect.field() for effect, on in zip(effects, acting, strict=True) if on]
+    parameters[:GRAVITY] = np.sum([np.zeros(GRAVITY), *fields], axis=0)
+    flags = [on for effect, on in zip(effects, acting, strict=True) if effect.compiled is not None]
+    end = int(parameters[GRAVITY + len(flags)])
+    parameters[end : end + len(flags)] = flags
+
+
+@inline_kernel
+def acts(parameters: Array, count: int, index: int) -> bool:
+    """Whether the index-th of count force effects acts now."""
+    return bool(parameters[int(parameters[GRAVITY + count]) + index] > 0.0)
 
 
 @inline_kernel
@@ -74,10 +91,11 @@ def step_source(
     files = [f"integrators.{file}" for file in INTEGRATORS[integrator].files]
     events = [*(["contact.events"] if touching else []), *(["contact.sleep"] if sleeping else [])]
     texts = {name: _text(name) for name in ("motion", *files, *events, "step")}
-    imports = ["from physics_prior.dynamics.compose import section"]
+    compiled = [effect.compiled for effect in effects if effect.compiled is not None]
+    timed = [effect.comes_and_goes for effect in effects if effect.compiled is not None]
+    imports = [f"from physics_prior.dynamics.compose import {'acts, ' * any(timed)}section"]
     names: dict[str, str] = {}
     lines: dict[str, list[str]] = {each: [] for each in FUNCTIONS}
-    compiled = [effect.compiled for effect in effects if effect.compiled is not None]
     for index, force in enumerate(compiled):
         for each, (_, arguments, line) in FUNCTIONS.items():
             if getattr(force, each) is None:
@@ -91,7 +109,8 @@ def step_source(
                 names[source_of] = f"{function.__name__}_{taken}" if taken else function.__name__
                 renamed = f" as {names[source_of]}" if taken else ""
                 imports.append(f"{source_of}{renamed}  # {digest}")
-            lines[each].append(line.format(f"{names[source_of]}(section(parameters, {index}), {arguments})"))
+            call = line.format(f"{names[source_of]}(section(parameters, {index}), {arguments})")
+            lines[each].append(f"if acts(parameters, {len(compiled)}, {index}): {call}" if timed[index] else call)
     if compiled:
         lines["energy"] = ["total = 0.0", *lines["energy"], "return total"]
         heads = [f"@kernel\ndef {name}(parameters, {arguments}):\n    " for name, arguments, _ in FUNCTIONS.values()]
@@ -158,6 +177,7 @@ def _compile_alone(effect: Effect) -> None:
             ) from problem
 
 
+@cache
 def _text(name: str) -> str:
     """The text of a part of the step, without what it imports from the parts before it: there it stands already."""
     source = Path(__file__).parent.joinpath(*name.split(".")).with_suffix(".py").read_text()

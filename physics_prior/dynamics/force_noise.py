@@ -10,7 +10,9 @@ class PointForces:
 
     def __init__(self, simulator: Simulator) -> None:
         self._simulator = simulator
-        self._noises = [noise for effect in simulator.effects for noise in effect.noise(simulator.tree)]
+        noises = [effect.noise(simulator.tree) for effect in simulator.effects]
+        self._noises = [noise for own in noises for noise in own]
+        self._owners = [index for index, own in enumerate(noises) for _ in own]
         self.count = sum(int(np.count_nonzero(noise.density)) for noise in self._noises)
 
     def columns(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -18,9 +20,10 @@ class PointForces:
         if not self.count:
             return np.zeros((self._simulator.nv, 0))
         self._simulator.move(q, v)
+        acting_now = self._simulator.switches.acting
         rows = [
-            noise.density[:, None] * self._simulator.jacobian(noise.at.part, noise.at.point)[3:]
-            for noise in self._noises
+            acting_now[owner] * noise.density[:, None] * self._simulator.jacobian(noise.at.part, noise.at.point)[3:]
+            for owner, noise in zip(self._owners, self._noises, strict=True)
         ]
         acting = np.concatenate([noise.density for noise in self._noises]) != 0.0
         return np.ascontiguousarray(np.vstack(rows)[acting].T)

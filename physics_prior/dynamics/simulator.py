@@ -39,7 +39,7 @@ class Simulator:
         nq, nv, rows: sizes of configuration, velocity and constraint rows.
         wrench_names: whose wrenches there are: moving joints, then effects that hold something, then what touches.
         touching: the last of these, contacts and limits, each with the indices of its records in ``candidates``.
-        switches: which of these hold now, and what happens when they take hold (switches.py).
+        switches: which of the effects act now, and what happens when they take hold (switches.py).
         interval: s, over which impulses of contact are told as forces: the step size.
         step, memory: the compiled step (compose.py) and the array it works in (memory.py).
         rank: rank of the constraint rows at the last evaluation (below ``rows`` where some are redundant: then the motion is
@@ -113,7 +113,7 @@ class Simulator:
         self._tangent = np.zeros(0)
         self._stores = any(effect.compiled is not None and effect.compiled.energy is not None for effect in effects)
         self._posed = np.zeros(self.nq)
-        self.switches = Switches(self, [(first, last) for _, first, last in self._labels])
+        self.switches = Switches(self, {label: (first, last) for label, first, last in self._labels})
         check_inertia(self)
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray | None = None) -> np.ndarray:

@@ -1,6 +1,6 @@
-"""What holds at present: attachments that come and go, the impulse with which they take hold, and where they did (eq. 9)."""
+"""What acts at present: effects that come and go, the impulse with which attachments take hold, and where they did (eq. 9)."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,6 +9,7 @@ import numpy as np
 from physics_prior import rotations
 from physics_prior.dynamics.anchor_motion import displaced_anchor
 from physics_prior.dynamics.assembly import ASSEMBLED, assemble, turned_over
+from physics_prior.dynamics.compose import set_acting
 from physics_prior.dynamics.conditioning import unlike
 from physics_prior.dynamics.records import pair_records
 from physics_prior.dynamics.wrench import Wrench
@@ -25,10 +26,10 @@ MOVED = 1e-12  # m or rad: below it, taking hold has not moved the body
 
 @dataclass(frozen=True)
 class Hold:
-    """Whether an effect holds, and where it took hold if it does so wherever its part is.
+    """Whether an effect holds or pushes, and where it took hold if it does so wherever its part is.
 
     Attributes:
-        active: whether its rows act.
+        active: whether it acts.
         caught: (7,) the point's position, m, and the part's axes, a quaternion, in the frame of what holds it; else empty.
     """
 
@@ -38,12 +39,12 @@ class Hold:
 
 @dataclass(frozen=True)
 class Event:
-    """An effect that takes hold or lets go by itself.
+    """An effect that begins to act or ends by itself.
 
     Attributes:
         time: ns since the scene's beginning.
-        index: of the effect among those that hold something.
-        on: whether it takes hold.
+        index: of the effect among those that can be switched.
+        on: whether it begins.
     """
 
     time: int
@@ -61,14 +62,21 @@ class Stretch:
 
 
 class Switches:
-    """The effects of a simulator that hold something, each with its point pairs [first, last) in the memory."""
+    """The effects of a simulator that can be switched: with its point pairs [first, last) in the memory; none if it only pushes.
 
-    def __init__(self, simulator: "Simulator", spans: Sequence[tuple[int, int]]) -> None:
-        self._simulator, self.spans = simulator, tuple(spans)
-        self.effects = tuple(effect for effect in simulator.effects if effect.point_pairs(simulator.tree))
+    Attributes:
+        effects, labels, spans: they, their names, and their point pairs.
+        acting: whether each of the simulator's effects acts, these or others.
+        events: what switches by itself, in order.
+    """
+
+    def __init__(self, simulator: "Simulator", spans: Mapping[str, tuple[int, int]]) -> None:
+        self._simulator = simulator
+        self.effects = tuple(effect for effect in simulator.effects if effect.switchable(simulator.tree))
         self.labels = [effect.label for effect in self.effects]
-        self._holds = tuple(Hold(True) for _ in self.effects)
-        for index, (first, last) in enumerate(spans):
+        self.spans = tuple(spans.get(label, (0, 0)) for label in self.labels)
+        self._holds, self.acting = tuple(Hold(True) for _ in self.effects), (True,) * len(simulator.effects)
+        for index, (first, last) in enumerate(self.spans):
             simulator.memory.pairs["here"][first:last] = self._here(index)
         self.holds = self.told([effect.active_at(0.0) for effect in self.effects])
         events = [
@@ -80,19 +88,25 @@ class Switches:
 
     @property
     def holds(self) -> tuple[Hold, ...]:
-        """What holds, effect by effect; set, it is what the next step goes by."""
+        """What holds or pushes, effect by effect; set, it is what the next step goes by."""
         return self._holds
 
     @holds.setter
     def holds(self, holds: tuple[Hold, ...]) -> None:
+        if holds == self._holds:
+            return
         for index, (old, new) in enumerate(zip(self._holds, holds, strict=True)):
             if new != old:
                 self._write(index, new)
         self._holds = tuple(holds)
+        on = dict(zip(self.labels, (hold.active for hold in holds), strict=True))
+        simulator = self._simulator
+        self.acting = tuple(on.get(effect.label, True) for effect in simulator.effects)
+        set_acting(simulator.memory.parameters, simulator.effects, self.acting)
 
     @property
     def holding(self) -> tuple[str, ...]:
-        """The names of the effects that hold now."""
+        """The names of the effects that hold, or push, now."""
         return tuple(label for label, hold in zip(self.labels, self._holds, strict=True) if hold.active)
 
     @property
@@ -102,28 +116,33 @@ class Switches:
         return int(pairs["rows"] @ pairs["active"]) if len(pairs) else 0
 
     def switch(self, label: str, on: bool, q: np.ndarray, v: np.ndarray) -> dict[str, Wrench]:
-        """Have an effect take hold or let go at q and v, which are put in place onto all that holds then; return the impulses.
+        """Have an effect act or not at q and v, which are put in place onto all that holds if it takes hold; return the impulses.
 
         Raises:
-            ModelError: no effect of that name holds anything; SimulationError: it cannot take hold there. Then nothing changes.
+            ModelError: no effect of that name can be switched; SimulationError: it cannot take hold there. Then nothing changes.
         """
-        before = self._holds, q.copy(), v.copy()
-        self.holds = self.switched(self.index(label), on, q)
+        before, index = (self._holds, q.copy(), v.copy()), self.index(label)
+        self.holds = self.switched(index, on, q)
         try:
-            return self.take_hold(q, v) if on else {}
+            return self.take_hold(q, v) if on and self.grips(index) else {}
         except SimulationError:
             self.holds, q[:], v[:] = before
             raise
 
     def begin(self, q: np.ndarray, v: np.ndarray) -> None:
-        """Have what holds at time zero take hold at q and v, which are put in place onto all of it."""
+        """Have what acts at time zero do so; what holds takes hold at q and v, which are put in place onto all of it."""
         self._simulator.time = 0.0
         for index, effect in enumerate(self.effects):
             self.holds = self.switched(index, effect.active_at(0.0), q)
         self.take_hold(q, v)
 
+    def grips(self, index: int) -> bool:
+        """Whether an effect holds something, and does not only push."""
+        first, last = self.spans[index]
+        return first < last
+
     def row_span(self, index: int) -> slice:
-        """The rows of an effect among those of the constraints."""
+        """The rows of an effect that holds something among those of the constraints."""
         first, last = self.spans[index]
         pairs = self._simulator.memory.pairs
         return slice(int(pairs["first"][first]), int(pairs["first"][last - 1] + pairs["rows"][last - 1]))
@@ -143,16 +162,19 @@ class Switches:
         due = [event for event in events if self._holds[event.index].active != event.on]
         for event in due:
             self.holds = self.switched(event.index, event.on, q)
-        return self.take_hold(q, v) if any(event.on for event in due) else {}
+        return self.take_hold(q, v) if any(event.on and self.grips(event.index) for event in due) else {}
 
     def index(self, label: str) -> int:
-        """Where an effect stands among those that hold something.
+        """Where an effect stands among those that can be switched.
 
         Raises:
-            ModelError: none of this name holds anything.
+            ModelError: none of this name can.
         """
         if label not in self.labels:
-            raise ModelError(f"effect '{label}' cannot be switched: those that hold something are {self.labels}")
+            raise ModelError(
+                f"effect '{label}' cannot be switched: those that hold something, or say 'when' or 'initially',"
+                f" are {self.labels}"
+            )
         return self.labels.index(label)
 
     def switched(self, index: int, on: bool, q: np.ndarray) -> tuple[Hold, ...]:
@@ -181,7 +203,7 @@ class Switches:
         Raises:
             SimulationError: the position cannot be put there.
         """
-        if not self.effects:
+        if not self._simulator.rows:
             return {}
         simulator, before, speed = self._simulator, q.copy(), v.copy()
         energy = _kinetic_energy(simulator, q, v)
@@ -250,7 +272,7 @@ class Switches:
         memory, out = self._simulator.memory, {}
         multipliers = memory.rows[-2]
         for label, (first, last), hold in zip(self.labels, self.spans, self._holds, strict=True):
-            if hold.active:
+            if hold.active and first < last:
                 pairs = memory.pairs[first:last]
                 forces = np.array(
                     [multipliers[p["first"] :][: p["rows"]] @ p["d"].reshape(3, 3)[: p["rows"]] for p in pairs]

@@ -19,7 +19,8 @@ from physics_prior.dynamics.point_force import (
     world_velocity,
 )
 from physics_prior.dynamics.types import Array, Records, Spatial, Vector
-from physics_prior.effects.effect import Anchor, CompiledForce, Effect, PointNoise
+from physics_prior.effects.effect import Anchor, CompiledForce, PointNoise
+from physics_prior.effects.switchable import Switchable
 from physics_prior.effects.two_points import Vector as Point
 from physics_prior.errors import ModelError
 from physics_prior.model import Tree
@@ -73,7 +74,7 @@ def differentiate_drag(
         i = links[i].parent
 
 
-class Drag(Effect):
+class Drag(Switchable):
     """Resistance of a medium to the motion of a point of a part, and to the part's turning."""
 
     kind: ClassVar[str] = "drag"
@@ -105,7 +106,7 @@ class Drag(Effect):
             if value
         ]
         wind = f" in wind{' and gusts' * any(self.gusts)}" if any(self.wind) else " in gusts" * any(self.gusts)
-        return f"resists the motion of {self.part}{wind}: {', '.join(terms)}"
+        return f"resists the motion of {self.part}{wind}: {', '.join(terms)}{self._spans()}"
 
     def parameters(self, tree: Tree) -> np.ndarray:
         link, point, _ = Anchor(self.part, np.array(self.point)).on_link(tree)

@@ -88,7 +88,7 @@ class Effect(BaseModel):
 
     An effect overrides what it contributes: ``field`` (an acceleration all mass feels), ``compiled`` + ``parameters`` (a
     force), ``point_pairs`` (equality rows), ``joint_ranges`` and ``touching_pairs`` (inequality rows), ``noise``. One with
-    equality rows may come and go: ``active_at``, ``switch_times``.
+    equality rows may come and go, and one that pushes and says so (switchable.py): ``active_at``, ``switch_times``.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, allow_inf_nan=False)
@@ -131,6 +131,15 @@ class Effect(BaseModel):
     def noise(self, tree: Tree) -> Sequence[PointNoise]:
         """White forces that simulations add and the estimator reckons with, beside the scene's own noise of forces."""
         return ()
+
+    @property
+    def comes_and_goes(self) -> bool:
+        """Whether it may act at some times only, also where all that it does is to push."""
+        return False
+
+    def switchable(self, tree: Tree) -> bool:
+        """Whether it can be switched."""
+        return self.comes_and_goes or bool(self.point_pairs(tree))
 
     def active_at(self, time: float) -> bool:
         """Whether it acts by itself at a time, s since the scene's beginning; commands may say otherwise."""

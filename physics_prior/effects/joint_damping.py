@@ -7,7 +7,8 @@ from pydantic import Field
 
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.types import Array, Records
-from physics_prior.effects.effect import CompiledForce, Effect, inner_joint
+from physics_prior.effects.effect import CompiledForce, inner_joint
+from physics_prior.effects.switchable import Switchable
 from physics_prior.model import Tree
 
 
@@ -35,7 +36,7 @@ def differentiate_joint_damping(
         tau_v[k, k] -= parameters[k]
 
 
-class JointDamping(Effect):
+class JointDamping(Switchable):
     """Viscous friction: each named joint resists its own velocity in proportion."""
 
     kind: ClassVar[str] = "joint_damping"
@@ -51,7 +52,8 @@ class JointDamping(Effect):
             inner_joint(tree, joint, "joint damping")
 
     def explain(self, tree: Tree) -> str:
-        return "joints resist their velocity: " + ", ".join(f"{j} {c:.3g}" for j, c in self.coefficients.items())
+        coefficients = ", ".join(f"{j} {c:.3g}" for j, c in self.coefficients.items())
+        return f"joints resist their velocity: {coefficients}{self._spans()}"
 
     def parameters(self, tree: Tree) -> np.ndarray:
         out = np.zeros(tree.nv)

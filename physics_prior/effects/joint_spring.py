@@ -10,7 +10,8 @@ from physics_prior.dynamics.algebra import dot
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.rotation_vector import inverse_right_jacobian, logarithm
 from physics_prior.dynamics.types import Array, Record, Records, Vector
-from physics_prior.effects.effect import CompiledForce, Effect, inner_joint
+from physics_prior.effects.effect import CompiledForce, inner_joint
+from physics_prior.effects.switchable import Switchable
 from physics_prior.errors import ModelError
 from physics_prior.model import JointKind, Link, Tree
 
@@ -87,7 +88,7 @@ def joint_spring_energy(parameters: Array, links: Records, work: Records, q: Arr
     return total
 
 
-class JointSpring(Effect):
+class JointSpring(Switchable):
     """Springs in named joints, linear in the coordinate; of a ball joint, in the rotation vector from its rest.
 
     That vector is at most half a turn long and flips there: a ball joint that may swing so far is pulled back the other way.
@@ -124,7 +125,7 @@ class JointSpring(Effect):
             damping = self.damping.get(joint, 0.0)
             damped = f" with {damping:.3g} {'N s/m' if slides else 'N m s/rad'}" if damping else ""
             terms.append(f"{joint} {stiffness:.3g} {'N/m' if slides else 'N m/rad'}{damped}")
-        return "pulls joints to rest: " + ", ".join(terms)
+        return f"pulls joints to rest: {', '.join(terms)}{self._spans()}"
 
     def parameters(self, tree: Tree) -> np.ndarray:
         index = {link.joint.name: i for i, link in enumerate(tree.links)}

@@ -4,8 +4,10 @@ An entry point's name is the effect's kind: ``[project.entry-points."physics_pri
 """
 
 import inspect
+import sys
 from collections.abc import Callable, Mapping
-from importlib.metadata import EntryPoint, entry_points
+from functools import cache
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
 
 from physics_prior.effects.effect import CompiledForce, Effect
 from physics_prior.errors import SceneError
@@ -21,8 +23,14 @@ def effect_loaders(built_in: Mapping[str, type[Effect]]) -> dict[str, Loader]:
 
     That function raises SceneError for an effect that cannot be loaded or does not keep the contract, or has a built-in's kind.
     """
-    offered = {point.name: _loader(point, point.name in built_in) for point in entry_points(group=GROUP)}
+    offered = {point.name: _loader(point, point.name in built_in) for point in _offered(tuple(sys.path))}
     return {kind: _known(effect) for kind, effect in built_in.items()} | offered
+
+
+@cache
+def _offered(path: tuple[str, ...]) -> EntryPoints:
+    """What packages on a search path offer: looked up once, for reading what they say of themselves takes longer than a scene."""
+    return entry_points(group=GROUP)
 
 
 def _known(effect: type[Effect]) -> Loader:

@@ -7,7 +7,8 @@ from pydantic import Field
 
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.types import Array, Record, Records
-from physics_prior.effects.effect import CompiledForce, Effect
+from physics_prior.effects.effect import CompiledForce
+from physics_prior.effects.switchable import Switchable
 from physics_prior.errors import ModelError
 from physics_prior.model import JointKind, Tree
 
@@ -85,7 +86,7 @@ def soft_limit_energy(parameters: Array, links: Records, work: Records, q: Array
     return total
 
 
-class SoftLimit(Effect):
+class SoftLimit(Switchable):
     """Soft stops: within `range` of an end a spring that stiffens evenly, and a damper; never pulls, and stops nothing hard.
 
     Together with `joint_limit` of the same ends, what is too fast for the spring meets a hard stop there.
@@ -130,7 +131,9 @@ class SoftLimit(Effect):
     def explain(self, tree: Tree) -> str:
         ends = [f"{joint} >= {end:.4g} over {self.range[joint]:.3g}" for joint, end in self.lower.items()]
         ends += [f"{joint} <= {end:.4g} over {self.range[joint]:.3g}" for joint, end in self.upper.items()]
-        return f"pushes joints back, ever more stiffly, before the ends of their range: {', '.join(ends)}"
+        return (
+            f"pushes joints back, ever more stiffly, before the ends of their range: {', '.join(ends)}{self._spans()}"
+        )
 
     def parameters(self, tree: Tree) -> np.ndarray:
         index = {link.joint.name: i for i, link in enumerate(tree.links)}

@@ -11,6 +11,7 @@ from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.point_force import differentiate_point_force, push, world_point, world_velocity
 from physics_prior.dynamics.types import Array, Matrix, Records, Vector
 from physics_prior.effects.effect import CompiledForce
+from physics_prior.effects.switchable import Switchable
 from physics_prior.effects.two_points import TwoPoints
 from physics_prior.model import Tree
 
@@ -93,7 +94,7 @@ def _diagonal(s: float) -> Matrix:
     return scale9(s, IDENTITY)
 
 
-class Spring(TwoPoints):
+class Spring(Switchable, TwoPoints):
     """A massless spring, and a damper along it, between a point of a part and a point of another part or of the world.
 
     With a rest length of zero it pulls with -k (b - a) in all directions. Its length is softened by 1e-9 m, below rounding
@@ -110,7 +111,7 @@ class Spring(TwoPoints):
 
     def explain(self, tree: Tree) -> str:
         damped = f", {self.damping:.4g} N s/m" if self.damping else ""
-        return f"pulls {self.part} to {self.to}: {self.stiffness:.4g} N/m from {self.rest_length:.4g} m{damped}"
+        return f"pulls {self.part} to {self.to}: {self.stiffness:.4g} N/m from {self.rest_length:.4g} m{damped}{self._spans()}"
 
     def parameters(self, tree: Tree) -> np.ndarray:
         a, b = (anchor.on_link(tree) for anchor in self.anchors())

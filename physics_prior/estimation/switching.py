@@ -100,7 +100,7 @@ def take_hold(filter: "Filter", posterior: "Posterior", index: int) -> Grip:
     switches, nv = simulator.switches, simulator.nv
     state, factor = posterior.state.copy(), posterior.factor.copy()
     switches.holds = switches.switched(index, True, state.q)
-    if not filter.constrained:
+    if not (filter.constrained and switches.grips(index)):
         return Grip(switches.holds, state, factor, np.eye(process.n), state, factor)
     if not switches.holds[index].caught:
         state, factor = _condition(filter, state, factor, index)

@@ -44,11 +44,15 @@ def diagnostics(
 
 
 def active_effects(scene: Scene, simulator: Simulator, estimate: Estimate | None) -> list[str]:
-    """The labels of the effects that act: those that push, and those that hold or touch something now."""
+    """The labels of the effects that act: those that always do, and those that hold, touch something or are switched on now."""
     holding = simulator.switches.holding if estimate is None else estimate.holding
     acting = {*holding, *_touching(simulator, estimate)}
     reactions = {effect.label: effect.reactions(scene.tree) for effect in scene.effects}
-    return [label for label, names in reactions.items() if not names or acting.intersection(names)]
+    return [
+        label
+        for label, names in reactions.items()
+        if (label in holding if label in simulator.switches.labels else not names or acting.intersection(names))
+    ]
 
 
 def _touching(simulator: Simulator, estimate: Estimate | None) -> list[str]:

@@ -114,7 +114,8 @@ def _touching(simulator: Simulator, estimate: Estimate) -> dict[str, bool]:
 
 
 def _holding(simulator: Simulator, estimate: Estimate) -> dict[str, bool]:
-    return {name: name in estimate.holding for name in simulator.switches.labels}
+    switches = simulator.switches
+    return {name: name in estimate.holding for index, name in enumerate(switches.labels) if switches.grips(index)}
 
 
 def _dots(

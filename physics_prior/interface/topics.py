@@ -1,6 +1,7 @@
 """Topics out: what a scene publishes, of which types, under which names. A scene has no topic for what it has not."""
 
 import re
+from collections.abc import Iterable
 
 from physics_prior.model import JointKind, Link, Tree
 from physics_prior.recording.messages import (
@@ -75,12 +76,14 @@ def free_links(tree: Tree) -> list[Link]:
 
 
 def force_topics(scene: Scene) -> dict[str, str]:
-    """Return constraint (a joint or an effect that holds something) -> topic of its force.
+    """Return constraint (a joint or an effect that holds something) -> topic of its force."""
+    return _topics(Subject(scene.tree, scene.effects).forces())
 
-    A topic may have fewer characters than a name: the others become '_', and names that become the same are numbered.
-    """
+
+def _topics(names: Iterable[str]) -> dict[str, str]:
+    """A topic may have fewer characters than a name: the others become '_', and names that become the same are numbered."""
     topics: dict[str, str] = {}
-    for name in Subject(scene.tree, scene.effects).forces():
+    for name in names:
         valid = re.sub(r"[^A-Za-z0-9_]", "_", name)[:LONGEST_NAME]
         if not valid[:1].isalpha():
             valid = f"joint_{valid}"
@@ -94,11 +97,10 @@ def force_topics(scene: Scene) -> dict[str, str]:
 
 
 def switch_services(scene: Scene) -> dict[str, str]:
-    """Return effect that holds something -> name of the node's service that switches it, as in its force's topic."""
-    held = [effect.label for effect in scene.effects if effect.point_pairs(scene.tree)]
-    return {
-        name: f"~/effects/{topic.rsplit('/', 1)[-1]}" for name, topic in force_topics(scene).items() if name in held
-    }
+    """Return effect that can be switched -> name of the node's service for that, as in its force's topic if it has one."""
+    labels = [effect.label for effect in scene.effects if effect.switchable(scene.tree)]
+    topics = _topics(dict.fromkeys([*force_topics(scene), *labels]))
+    return {label: f"~/effects/{topics[label].rsplit('/', 1)[-1]}" for label in labels}
 
 
 def deviation_topic(topic: str) -> str:

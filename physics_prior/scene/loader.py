@@ -159,14 +159,14 @@ def _check_finite(effect: Effect, tree: Tree) -> bool:
 
 
 def _read_measurements(place: Place, tree: Tree, effects: tuple[Effect, ...]) -> tuple[MeasurementSource, ...]:
-    held = [effect.label for effect in effects if effect.point_pairs(tree)]
+    switchable = [effect.label for effect in effects if effect.switchable(tree)]
     sources: list[MeasurementSource] = []
     for entry in place.entries():
         _, source_type, inner = choose(entry, SOURCES, "a measurement")
         source = validate(source_type, inner)
         source.check(tree, inner)
         if isinstance(source, SwitchSource):
-            require_known(inner["effect"], source.effect, held, "effect that holds something")
+            require_known(inner["effect"], source.effect, switchable, "effect that can be switched")
         if source.topic in [other.topic for other in sources]:
             raise inner["topic"].error(f"'{source.topic}' is read twice: give each measurement its own topic")
         sources.append(source)

@@ -106,7 +106,7 @@ class JointSource(MeasurementSource):
 
 
 class SwitchSource(MeasurementSource):
-    """A force by which an effect that holds something is felt: it takes hold above one size of it and lets go below another.
+    """A force by which an effect is felt that can be switched: it begins to act above one size of it and ends below another.
 
     Attributes:
         effect: the effect's name.

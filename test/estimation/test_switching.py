@@ -276,7 +276,7 @@ def test_a_measured_force_switches_with_hysteresis(caught_scene, scheduled, mome
 
 
 def test_a_switch_names_an_effect_that_holds_something(caught_scene):
-    with pytest.raises(SceneError, match=r"'gravity' is not an effect that holds something.*\['hand'\]"):
+    with pytest.raises(SceneError, match=r"'gravity' is not an effect that can be switched.*\['hand'\]"):
         caught_scene(more="- switch: {topic: /hand/force, effect: gravity, above: 2 N, below: 0.5 N}")
     with pytest.raises(SceneError, match="below 3 N is not valid: give at most above, 2 N"):
         caught_scene(more="- switch: {topic: /hand/force, effect: hand, above: 2 N, below: 3 N}")

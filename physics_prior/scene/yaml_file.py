@@ -158,6 +158,17 @@ def parse_yaml(path: Path, text: str) -> Place:
     return Place(path, (), top)
 
 
+def placed(path: Path, data: Any) -> Place:
+    """Plain data that ``Place.value`` gave, or that were made from such, as if they stood in one line of a file."""
+    return Place(path, (), _node(data))
+
+
+def _node(value: Any) -> _Node:
+    if isinstance(value, dict):
+        return _Node(1, {key: _node(inner) for key, inner in value.items()})
+    return _Node(1, [_node(inner) for inner in value] if isinstance(value, list) else value)
+
+
 class _Builder:
     """Builds nodes from PyYAML's parsing events, so that limits hold before memory is spent."""
 

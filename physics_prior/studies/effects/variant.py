@@ -1,7 +1,6 @@
 """Variants of a scene: an effect left out or added, numbers changed; each is built as a file of its own would be."""
 
 import copy
-import json
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from typing import Any
 from physics_prior.errors import SceneError
 from physics_prior.resources import scene_path
 from physics_prior.scene import Scene, Step, build_scene
-from physics_prior.scene.yaml_file import parse_yaml, read_yaml, shown
+from physics_prior.scene.yaml_file import placed, read_yaml, shown
 
 _NUMBER = re.compile(r"\s*([-+]?(?:\.\d+|\d+\.?\d*)(?:[eE][-+]?\d+)?)(\s.*)?", re.ASCII | re.DOTALL)
 
@@ -37,8 +36,8 @@ class SceneText:
         return SceneText(path, read_yaml(path).value)
 
     def build(self) -> Scene:
-        """The scene; SceneError as of a file, its lines those of the variant."""
-        return build_scene(parse_yaml(self.path, json.dumps(self.data, indent=1)))
+        """The scene; SceneError as of a file of one line."""
+        return build_scene(placed(self.path, self.data))
 
     def stepped(self, step: Step) -> "SceneText":
         """The scene with the step that was chosen for it, if it asks for an accuracy: what variants of it are compared at."""

@@ -1,10 +1,11 @@
 """The likelihood of recordings, and what it says of effects that are there and of those that are not."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
+from scipy.stats import chi2, t
 
 from physics_prior.errors import RecordingError
 from physics_prior.resources import share_directory
@@ -114,6 +115,27 @@ def test_a_cube_that_slides_calls_for_contact_and_friction(sliding_cube):
     measurements = simulated_measurements(sliding_cube.build(), seed=3, duration=0.3)
     verdicts = ablate(sliding_cube, [measurements], held=["effects.table.restitution"]).verdicts
     assert {each.name for each in verdicts if each.keep} == FRICTION_NEEDS  # nothing bounces
+
+
+@pytest.mark.slow
+def test_lengths_of_real_tosses_are_two_percent_short(shared):
+    """As 570 tosses say, by rest heights and free fall (0.978): so do six before they touch, by free fall alone."""
+    path, in_flight = "measurements.0.pose.scale", 18
+    text = SceneText.read("thrown_cube_smoothed").changed({path: 1.0})
+    bags = [shared / "bags" / f"cube_toss_{toss}" for toss in (120, 128, 172, 410, 438, 550)]
+    missing = [str(bag) for bag in bags if not bag.exists()]
+    if missing:
+        pytest.skip(f"missing {', '.join(missing)}")
+    recordings = [read_measurements(bag, text.build())[:in_flight] for bag in bags]
+    pooled = fit(text, [path], recordings)
+    (scale,) = pooled.parameters()
+    assert 1.0 / scale.value == pytest.approx(0.978, rel=0.005)  # 0.9806
+    assert 1.0 / scale.high == pytest.approx(0.978, abs=0.002)  # 0.9780 to 0.9833
+    assert pooled.found.nis == pytest.approx(1.0, abs=0.15)  # 0.967 over 612 rows, whose own deviation is 0.06
+    alone = np.array([fit(text, [path], [recording]).numbers[path] for recording in recordings])
+    half = t.ppf(0.975, len(alone) - 1) * alone.std(ddof=1) / math.sqrt(len(alone))
+    assert alone.mean() - half < 1.0 / 0.978 < alone.mean() + half  # 1.0146 to 1.0250
+    assert half < 0.006
 
 
 @pytest.mark.slow

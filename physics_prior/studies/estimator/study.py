@@ -25,6 +25,7 @@ from physics_prior.studies.moving_human import moments
 
 SECONDS, SETTLED = 8.0, 0.4  # s, and s of the beginning that do not count
 WARMING = 8  # stamps that compile what is not yet
+REMEMBERED = 1.0  # s, beyond a lag, by an estimator that is timed: as live
 FOREVER = 1e6  # s
 PAYING = 1.02  # times the errors of the most accurate steps: within it, noise is all that is left
 
@@ -63,44 +64,65 @@ def run_study(names: Sequence[str], seed: int, progress: Callable[[float], None]
     for index, name in enumerate(chosen):
         scene = PROBLEMS[name]()
         recording = moments(scene, SECONDS, seed)
-        for done, variant in enumerate(VARIANTS):
-            out.append(measure(name, scene, variant, recording))
+        costs = costs_of(scene, VARIANTS, [moment.measurements for moment in recording])
+        for done, (variant, us) in enumerate(zip(VARIANTS, costs, strict=True)):
+            out.append(measure(name, scene, variant, recording, us))
             progress((index + (done + 1) / len(VARIANTS)) / len(chosen))
     return out
 
 
-def measure(name: str, scene: Scene, variant: Variant, recording: Sequence[Moment]) -> Point:
-    """Run one variant on a recording."""
-    measured = recording[:: variant.every]
-    estimator, last, us = _timed(scene, variant, [moment.measurements for moment in measured])
+def measure(name: str, scene: Scene, variant: Variant, recording: Sequence[Moment], us: float) -> Point:
+    """Run one variant, whose cost is known, on a recording."""
+    fed, measured = _Fed(scene, variant, FOREVER), recording[:: variant.every]
+    for moment in measured:
+        fed.feed(moment.measurements)
     true = {moment.stamp: moment for moment in measured}
     begun = recording[0].stamp + round(SETTLED * 1e9)
-    pairs = [(true[stamp], posterior) for stamp, posterior in last.items() if stamp >= begun]
-    rmse, nees, force = _errors(estimator, pairs)
+    pairs = [(true[stamp], posterior) for stamp, posterior in fed.told().items() if stamp >= begun]
+    rmse, nees, force = _errors(fed.estimator, pairs)
     return Point(name, variant.series, variant.label, us, rmse, nees, force)
 
 
-def _timed(
-    scene: Scene, variant: Variant, stamps: Sequence[Sequence[Measurement]]
-) -> tuple[Estimator, dict[int, Posterior], float]:
-    """Feed an estimator what was measured, stamp by stamp.
+class _Fed:
+    """An estimator run as a variant says, that remembers what was measured for some seconds."""
 
-    Return it, the posterior of each stamp, told by its lag, and the median of microseconds a measurement.
+    def __init__(self, scene: Scene, variant: Variant, seconds: float) -> None:
+        self.estimator = Estimator(variant.of(scene), variant.process, seconds)
+        self._lag = round(variant.lag * 1e9)
+        self._lagged = Lagged(self.estimator, self._lag, FOREVER)
+        self._told: dict[int, Posterior] = {}
+
+    def feed(self, measurements: Sequence[Measurement]) -> float:
+        """Take in what was measured at a stamp; return the microseconds of the processor that one measurement took."""
+        start = thread_time_ns()
+        for measurement in measurements:
+            self.estimator.add(measurement)
+        due = list(self._lagged.due(measurements[-1].stamp)) if self._lag > 0 else []
+        taken = (thread_time_ns() - start) / 1e3 / len(measurements)
+        self._told |= {each.stamp: each for each in due}
+        return taken
+
+    def told(self) -> dict[int, Posterior]:
+        """The posterior of each stamp, told by its lag."""
+        if self._lag > 0:
+            return self._told
+        return {node.measurement.stamp: node.posterior for node in self.estimator.history.nodes}
+
+
+def costs_of(scene: Scene, variants: Sequence[Variant], stamps: Sequence[Sequence[Measurement]]) -> list[float]:
+    """Microseconds of the processor that each variant takes a measurement: medians, all taking turns at every stamp.
+
+    In another order each time: a turn is the slower for the memory that the one before it took from the caches.
     """
+    order = np.random.default_rng(0)
     for warm in (True, False):  # what is not compiled yet is so the first time
-        estimator, times = Estimator(variant.of(scene), variant.process, FOREVER), []
-        lag = round(variant.lag * 1e9)
-        lagged = Lagged(estimator, lag, FOREVER)
-        told: dict[int, Posterior] = {}
-        for measurements in stamps[:WARMING] if warm else stamps:
-            start = thread_time_ns()
-            for measurement in measurements:
-                estimator.add(measurement)
-            if lag > 0:
-                told |= {each.stamp: each for each in lagged.due(measurements[-1].stamp)}
-            times.append((thread_time_ns() - start) / 1e3 / len(measurements))
-    last = told if lag > 0 else {node.measurement.stamp: node.posterior for node in estimator.history.nodes}
-    return estimator, last, float(np.median(times))
+        fed = [_Fed(scene, variant, REMEMBERED + variant.lag) for variant in variants]
+        times: list[list[float]] = [[] for _ in variants]
+        for index, measurements in enumerate(stamps[:WARMING] if warm else stamps):
+            for turn in order.permutation(len(variants)):
+                if index % variants[turn].every == 0:
+                    times[turn].append(fed[turn].feed(measurements))
+    return [float(np.median(taken)) for taken in times]
 
 
 def run_recording(bag: Path, scene: Scene, reference: str, progress: Callable[[float], None]) -> list[Point]:
@@ -111,9 +133,9 @@ def run_recording(bag: Path, scene: Scene, reference: str, progress: Callable[[f
     """
     out, stamps = [], _measured(bag, scene)
     variants = [*STEPS, Variant(process="kinematic")]
-    for done, variant in enumerate(variants):
+    costs = costs_of(scene, variants, stamps)
+    for done, (variant, us) in enumerate(zip(variants, costs, strict=True)):
         figures = replay(bag, variant.of(scene), process=variant.process, references=[reference]).summary()
-        _, _, us = _timed(scene, variant, stamps)
         score, nis = figures["reference"] or {}, figures["nis"]
         angles, forces = (_number(score.get(key)) for key in ("position_rmse_deg", "force_rmse_percent_weight"))
         consistency = nis["mean"] / nis["expected"] if nis["mean"] is not None else float("nan")

@@ -8,7 +8,7 @@ import pytest
 from physics_prior import cli
 from physics_prior.errors import PhysicsPriorError
 from physics_prior.studies.estimator import study
-from physics_prior.studies.estimator.study import Point, enough, measure, run_study
+from physics_prior.studies.estimator.study import Point, costs_of, enough, measure, run_study
 from physics_prior.studies.estimator.variants import PROBLEMS, Variant
 from physics_prior.studies.moving_human import moments
 
@@ -25,7 +25,7 @@ def test_smoothing_helps_and_no_physics_costs(recording):
     """RMSE 0.24 deg with the shipped noise, 0.17 smoothed by 0.4 s more, 1.2 without physics; NEES 0.7 to 0.9."""
     scene, moments_of = recording
     plain, late, none = (
-        measure("double_pendulum", scene, variant, moments_of)
+        measure("double_pendulum", scene, variant, moments_of, 1.0)
         for variant in (Variant(), Variant(lag=0.4), Variant(process="kinematic"))
     )
     assert late.rmse_deg < 0.95 * plain.rmse_deg
@@ -33,7 +33,13 @@ def test_smoothing_helps_and_no_physics_costs(recording):
     assert 0.3 < plain.consistency < 1.7
     assert plain.force_percent < 2.0
     assert none.force_percent != none.force_percent
-    assert plain.us > 0.0
+
+
+def test_all_are_timed_at_the_stamps_that_they_read(recording):
+    scene, moments_of = recording
+    costs = costs_of(scene, (Variant(), Variant(every=4), Variant(lag=0.1)), [each.measurements for each in moments_of])
+    assert len(costs) == 3
+    assert min(costs) > 0.0
 
 
 def test_enough_is_the_cheapest_that_noise_hides():

@@ -68,7 +68,7 @@ def plot_forces(result: ReplayResult, path: Path) -> None:
     """Draw the forces of the ground against force plates, by component; as ``plot_joints``. There must be some."""
     require_format(path)
     count = len(result.forces)
-    figure = Figure(figsize=(13.0, 1.0 + 2.0 * count), dpi=110, layout="constrained")
+    figure = Figure(figsize=(13.0, 1.0 + 2.2 * count), dpi=110, layout="constrained")
     for row, (name, comparison) in enumerate(result.forces.items()):
         figures = comparison.figures(result.weight)
         stamps = (comparison.stamps - result.epoch) * 1e-9
@@ -87,7 +87,7 @@ def plot_forces(result: ReplayResult, path: Path) -> None:
                 told.append(f"{own['rrmse_percent']:.2g} % of range")
             if own["r"] is not None:
                 told.append(f"r {own['r']:.3f}")
-            axes.set_title(f"{name}, {component.replace('_', '-')}: {', '.join(told)}", loc="left", fontsize=7)
+            axes.set_title(f"{name}, {component.replace('_', '-')}\n{', '.join(told)}", loc="left", fontsize=7)
             axes.set_ylabel("[N]", fontsize=7)
             if row == count - 1:
                 axes.set_xlabel("time [s]", fontsize=7)

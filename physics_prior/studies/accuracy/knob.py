@@ -27,6 +27,7 @@ from physics_prior.studies.bench import machine, one_core
 from physics_prior.studies.problems.mechanism import Benchmark, Run
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+ROUNDS = 9  # of timing: more than the study's, as ratios of runs of a millisecond waver
 MOST_ERROR, MOST_COST = 3.0, 2.0  # times what is asked, and times the best on the measured front
 
 
@@ -80,7 +81,7 @@ def turns(problem: Problem, progress: Callable[[float], None] = lambda part: Non
             asked.append(Compiled(step.integrator, [_setting(step)], f"{tolerance:g}", "chosen"))
         progress(0.5 * (index + 1) / len(TOLERANCES))
     study = [scheme for scheme in own_schemes(problem) if scheme.engine == "compiled"]
-    points = measure(problem, [*study, *asked], lambda part: progress(0.5 + 0.5 * part))
+    points = measure(problem, [*study, *asked], lambda part: progress(0.5 + 0.5 * part), ROUNDS)
     front = [point for point in points if point.engine == "compiled"]
     seconds = {float(point.scheme): point.seconds for point in points if point.engine == "chosen"}
     best = {turn.tolerance: seconds_to_reach(front, turn.tolerance) for turn in out if turn.seconds is None}

@@ -3,7 +3,8 @@
 Of each setting: the largest error against a reference of other origin, the change of energy, how far what holds was open,
 processor time per simulated second. Printed is the Pareto front, what is worth taking; --json has everything and --plot draws
 it. With --peers MuJoCo, Pinocchio and Exudyn take turns with ours on the problems that they can be given alike. All ten
-problems take the better part of an hour; the first time, kernels are compiled besides. --compare sets the times of an earlier card beside.
+problems take the better part of an hour; the first time, kernels are compiled besides. --compare sets the times of an earlier
+card beside.
 
 With --knob the tolerances 1e-2 to 1e-8 are asked for instead, as a scene's `accuracy: {tolerance: ...}` would: told is what the
 step that is chosen errs over what was asked, and what it costs over the best of the study.

@@ -72,6 +72,7 @@ def _effects(args: argparse.Namespace) -> int:
         write_json(args.json, figures)
     if args.json != STDOUT:
         console().print(effect_costs.table(figures), soft_wrap=True)
+        console().print()
         console().print(scene_costs.table(figures), soft_wrap=True)
     return 0
 

@@ -1,6 +1,7 @@
 """A calibrated person as a scene file."""
 
 import json
+import math
 import textwrap
 
 import numpy as np
@@ -12,14 +13,21 @@ from physics_prior.scene import MarkerSet
 
 LEAST_NOISE = 1e-3  # m: cameras and labels leave as much
 UNKNOWN = 15.0  # rad/s^2 sqrt(s) and m/s^2 sqrt(s): accelerations by what is not modelled, muscles first of all
+BESIDE = 50.0  # rad/s^2 sqrt(s): accelerations of a joint by what is not modelled, where muscles are
+MUSCLE = 3000.0  # rad/s^3 sqrt(s): jerk of a joint by its muscles
+CONSTANT = 1.0  # s, over which torques of muscles and forces of the ground are forgotten
+VERTICAL, HORIZONTAL, MOMENT = 1.0, 0.2, 0.08  # of the ground's force, of the weight; of its moment, m of the weight
+STANDARD_GRAVITY = 9.80665
 TONE = 10.0  # 1/s: what joints that no marker tells come to rest by
 
 
-def scene_text(found: Calibration, markers: MarkerSet, topic: str, frame_id: str, origin: str, scale: float) -> str:
+def scene_text(
+    found: Calibration, markers: MarkerSet, topic: str, frame_id: str, origin: str, scale: float, forces: bool = False
+) -> str:
     """The text of a scene: the person, the markers of a topic where they are on it, and noise to track it by.
 
     topic, frame_id: of a recording, and so quoted. origin: one line that says what it was made from. scale: of the
-    markers' noise over what is left of them in the trial.
+    markers' noise over what is left of them in the trial. forces: whether muscles and the ground are to be found.
     """
     human, ease = found.human, _ease(found)
     lengths = "\n".join(
@@ -59,7 +67,7 @@ effects:
       # muscles that hold: a joint by itself comes to rest within {1.0 / TONE:g} s
       coefficients:
 {_damping(found, ease)}
-measurements:
+{_unknown(found, ease) if forces else ""}measurements:
   - points:
       topic: {json.dumps(topic)}
       noise: {scale * max(found.rms, LEAST_NOISE):.5f}
@@ -68,9 +76,7 @@ measurements:
         + "\n".join(lines)
         + f"""
 noise:
-  # unknown accelerations of {UNKNOWN:g} rad/s^2 sqrt(s), or m/s^2 sqrt(s), of each joint by itself
-  force:
-{_forces(found, ease)}
+{_white(found, ease, forces)}
   jerk: 300
   velocity: 2
 step: {{size: 5 ms}}
@@ -93,12 +99,43 @@ def _damping(found: Calibration, ease: np.ndarray) -> str:
     return "\n".join(f"        {link.joint.name}: {TONE / np.median(ease[link.v]):.2g}" for link in joints)
 
 
-def _forces(found: Calibration, ease: np.ndarray) -> str:
+def _by_joint(found: Calibration, values: np.ndarray, indent: int) -> str:
+    """A line for each inner joint with its own of values (nv,)."""
     lines = []
     for link in found.human.tree().links:
-        own = [f"{value:.2g}" for value in UNKNOWN / ease[link.v]]
-        value = own[0] if link.joint.nv == 1 else f"[{', '.join(own)}]"
-        if link.joint.kind is JointKind.FREE:
-            value = f"{{linear: {own[0]}, angular: {own[4]}}}"
-        lines.append(f"    {link.joint.name}: {value}")
+        if link.joint.kind is not JointKind.FREE:
+            own = [f"{value:.2g}" for value in values[link.v]]
+            lines.append(f"{' ' * indent}{link.joint.name}: {own[0] if len(own) == 1 else '[' + ', '.join(own) + ']'}")
     return "\n".join(lines)
+
+
+def _unknown(found: Calibration, ease: np.ndarray) -> str:
+    return f"""  - muscle:
+      # jerks of {MUSCLE:g} rad/s^3 sqrt(s) of each joint by itself
+      time_constant: {CONSTANT:g} s
+      strength:
+{_by_joint(found, MUSCLE * math.sqrt(0.5 * CONSTANT) / ease, 8)}
+{_feet(found)}
+"""
+
+
+def _white(found: Calibration, ease: np.ndarray, forces: bool) -> str:
+    root = found.human.tree().links[0]
+    if forces:
+        text = f"{BESIDE:g} rad/s^2 sqrt(s) of each joint by itself; nothing holds the whole but the ground"
+        own = "0"
+    else:
+        text = f"{UNKNOWN:g} rad/s^2 sqrt(s), or m/s^2 sqrt(s), of each joint by itself"
+        linear, angular = (UNKNOWN / ease[root.v])[[0, 4]]
+        own = f"{{linear: {linear:.2g}, angular: {angular:.2g}}}"
+    lines = _by_joint(found, (BESIDE if forces else UNKNOWN) / ease, 4)
+    return f"  # unknown accelerations of {text}\n  force:\n    {root.joint.name}: {own}\n{lines}"
+
+
+def _feet(found: Calibration) -> str:
+    weight = found.human.mass * STANDARD_GRAVITY
+    strength = f"vertical: {VERTICAL * weight:.0f} N, horizontal: {HORIZONTAL * weight:.0f} N, moment: {MOMENT * weight:.0f} N m"
+    return "\n".join(
+        f"  - ground_reaction: {{name: {side}_sole, part: {side}_sole, {strength}, time_constant: {CONSTANT:g} s}}"
+        for side in ("left", "right")
+    )

@@ -8,6 +8,7 @@ number is written with its standard deviation. The ground is z = 0, z up. The sa
 
 Examples:
   physics-prior calibrate my_trial --subject mass=60.8,sex=male --markers anatomical_45 -o my_person.yaml
+  physics-prior calibrate my_trial --subject mass=60.8,sex=male --markers anatomical_45 --forces -o my_person.yaml
   physics-prior calibrate my_trial --subject mass=70,sex=female,height=1.68 --markers my_set.yaml -o my_person.yaml
 """
 
@@ -36,6 +37,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--topic", default="/markers", help="the PoseArray of the markers (/markers)")
     parser.add_argument("-o", "--output", metavar="SCENE", type=Path, required=True, help="the scene to write")
+    parser.add_argument(
+        "--forces", action="store_true", help="have muscles' torques and the ground's forces found, too"
+    )
     parser.add_argument("--json", metavar="FILE", help="write the figures as JSON; - prints that and nothing else")
 
 
@@ -61,13 +65,14 @@ def run(args: argparse.Namespace) -> int:
     words = ",".join(
         f"{key}={value:g}" if isinstance(value, float) else f"{key}={value}" for key, value in subject.items()
     )
-    origin = f"physics-prior calibrate {args.bag.name} --subject {words} --markers {args.markers} -o {args.output.name}"
+    options = f"--subject {words} --markers {args.markers} {'--forces ' * args.forces}-o {args.output.name}"
+    origin = f"physics-prior calibrate {args.bag.name} {options}"
     measurements = [
         PointsMeasurement(stamp, args.topic, each) for stamp, each in zip(stamps.tolist(), points, strict=True)
     ]
     scale = 1.0
     for index in range(ROUNDS):
-        text = scene_text(found, markers, args.topic, frame_id, origin, scale)
+        text = scene_text(found, markers, args.topic, frame_id, origin, scale, args.forces)
         scene = build_scene(parse_yaml(args.output, text))
         if index == 0:
             with compiling(scene, "carry"):
@@ -76,7 +81,9 @@ def run(args: argparse.Namespace) -> int:
             report(index / ROUNDS)
             scale *= noise_ratio(scene, measurements)
     with whole_file(args.output) as partial:
-        partial.write_text(scene_text(found, markers, args.topic, frame_id, origin, scale), encoding="utf-8")
+        partial.write_text(
+            scene_text(found, markers, args.topic, frame_id, origin, scale, args.forces), encoding="utf-8"
+        )
     if args.json is not None:
         write_json(args.json, _figures(found))
     if args.json != STDOUT:

@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from physics_prior.dynamics.memory import OPEN
 from physics_prior.errors import SimulationError
 
@@ -23,3 +25,13 @@ def failure(simulator: "Simulator", rank: int, h: float) -> SimulationError:
     return SimulationError(
         f"the integrator '{simulator.integrator}' found no solution of a step of {h:g} s: a smaller step size may do"
     )
+
+
+def require_finite(simulator: "Simulator", vdot: np.ndarray) -> None:
+    """Raise SimulationError if an acceleration (nv,) is not finite."""
+    finite = np.isfinite(vdot)
+    if not finite.all():
+        raise SimulationError(
+            f"the acceleration of '{simulator.tree.freedom_names[int(np.argmin(finite))]}' is not finite: the state is not,"
+            " or a joint carries no inertia in this posture (a straight chain of thin rods)"
+        )

@@ -14,15 +14,16 @@ from physics_prior.dynamics.contact.memory import Sleep, candidates_in, contact_
 from physics_prior.dynamics.contact.reactions import candidates_by_name, reaction
 from physics_prior.dynamics.contact.records import candidate_records
 from physics_prior.dynamics.covariance import carry_step
-from physics_prior.dynamics.failure import failure
+from physics_prior.dynamics.failure import failure, require_finite
 from physics_prior.dynamics.inertia_check import check_inertia
 from physics_prior.dynamics.integrators import DEFAULT, INTEGRATORS, TOLERATED, IntegratorName
 from physics_prior.dynamics.memory import SPARE, TIME, TOLERANCE, Memory, correction_size, tangent_size
 from physics_prior.dynamics.records import link_records, motion_tables, moved_freedoms, pair_records
 from physics_prior.dynamics.switches import Switches
+from physics_prior.dynamics.unknown_forces import UnknownForces
 from physics_prior.dynamics.wrench import Wrench
 from physics_prior.effects.effect import Effect, PointPair
-from physics_prior.errors import ModelError, SimulationError
+from physics_prior.errors import ModelError
 from physics_prior.model import Tree
 
 
@@ -37,8 +38,9 @@ class Simulator:
     Attributes:
         tree, effects, integrator: what it was built from.
         nq, nv, rows: sizes of configuration, velocity and constraint rows.
-        wrench_names: whose wrenches there are: moving joints, then effects that hold something, then what touches.
-        touching: the last of these, contacts and limits, each with the indices of its records in ``candidates``.
+        wrench_names: whose wrenches there are: moving joints, then effects that hold something, what touches, and feet.
+        touching: contacts and limits, each with the indices of its records in ``candidates``.
+        unknown: the unknown forces and the values that they have now (unknown_forces.py).
         switches: which of the effects act now, and what happens when they take hold (switches.py).
         interval: s, over which impulses of contact are told as forces: the step size.
         step, memory: the compiled step (compose.py) and the array it works in (memory.py).
@@ -76,11 +78,6 @@ class Simulator:
         if sleep is not None and not len(candidates):
             raise ModelError("'sleep' is not valid where nothing may touch: it spares contact, and there is none")
         self.touching = candidates_by_name(tree, effects)
-        self.wrench_names = [
-            *(link.joint.name for link in tree.links),
-            *(label for label, _, _ in self._labels),
-            *self.touching,
-        ]
         self.interval, self.rank = interval, 0
         self.nq, self.nv = tree.nq, tree.nv
         self.rows = sum(1 if pair.length is not None else len(pair.directions) for pair in pairs)
@@ -102,7 +99,13 @@ class Simulator:
             contact_memory(candidates, self.rows, width, self.nq, sleep) if len(candidates) else None,
         )
         memory.array[TOLERANCE] = tolerance
-        self.memory = memory
+        self.memory, self.unknown = memory, UnknownForces(tree, effects, memory.parameters)
+        self.wrench_names = [
+            *(link.joint.name for link in tree.links),
+            *(label for label, _, _ in self._labels),
+            *self.touching,
+            *(foot.name for foot in self.unknown.feet),
+        ]
         self._links, self._work, self._pairs = memory.links, memory.work, memory.pairs
         self.candidates = candidates_in(memory.contact_part)
         self._gravity = memory.parameters[:GRAVITY]
@@ -315,6 +318,7 @@ class Simulator:
             for row, indices in enumerate(self.touching.values(), start=count + len(self._labels)):
                 push = reaction(self.tree, self._work, self.candidates[indices])
                 out[row, :3], out[row, 3:] = push.force, push.moment
+            out[len(out) - len(self.unknown.feet) :] = self.unknown.wrench_rows()
         else:
             self.candidates[["force", "moment", "point"]] = 0.0
             kinematics.move(self._links, self._work, q, v)
@@ -332,6 +336,7 @@ class Simulator:
             *self._work["origin"],
             *(self._pairs["b"][first] for _, first, _ in self._labels),
             *(reaction(self.tree, self._work, self.candidates[each]).point for each in self.touching.values()),
+            *self.unknown.points(self),
         ]
         return {
             name: Wrench(row[:3], row[3:], np.array(point))
@@ -391,9 +396,4 @@ class Simulator:
             self.step.evaluate(array, q, v, extra, 0.0, vdot)
             impulse.load_contacts(array, h)
             vdot += self.memory.spare[1] / h
-        finite = np.isfinite(vdot)
-        if not finite.all():
-            raise SimulationError(
-                f"the acceleration of '{self.tree.freedom_names[int(np.argmin(finite))]}' is not finite: the state is not,"
-                " or a joint carries no inertia in this posture (a straight chain of thin rods)"
-            )
+        require_finite(self, vdot)

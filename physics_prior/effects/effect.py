@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from physics_prior import rotations
 from physics_prior.effects.anchor_motion import AnchorMotion
 from physics_prior.effects.touching import Footing, JointRange, TouchingPair
+from physics_prior.effects.unknown_force import UnknownForce
 from physics_prior.errors import ModelError
 from physics_prior.model import JointKind, Link, Tree
 
@@ -87,8 +88,9 @@ class Effect(BaseModel):
     """Base of all effects. One effect is one file: parameters with units and bounds, what it adds, why it is there.
 
     An effect overrides what it contributes: ``field`` (an acceleration all mass feels), ``compiled`` + ``parameters`` (a
-    force), ``point_pairs`` (equality rows), ``joint_ranges`` and ``touching_pairs`` (inequality rows), ``noise``. One with
-    equality rows may come and go, and one that pushes and says so (switchable.py): ``active_at``, ``switch_times``.
+    force), ``unknown_force`` (parameters of it that the estimator finds), ``point_pairs`` (equality rows), ``joint_ranges`` and
+    ``touching_pairs`` (inequality rows), ``noise``. One with equality rows may come and go, and one that pushes and says so
+    (switchable.py): ``active_at``, ``switch_times``.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, allow_inf_nan=False)
@@ -131,6 +133,10 @@ class Effect(BaseModel):
     def noise(self, tree: Tree) -> Sequence[PointNoise]:
         """White forces that simulations add and the estimator reckons with, beside the scene's own noise of forces."""
         return ()
+
+    def unknown_force(self, tree: Tree) -> UnknownForce | None:
+        """Those of its parameters that nothing tells, states of the estimator; None where there are none."""
+        return None
 
     @property
     def comes_and_goes(self) -> bool:

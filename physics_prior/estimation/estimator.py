@@ -11,7 +11,7 @@ from physics_prior.estimation.estimate import Counts, Estimate, Health, Level
 from physics_prior.estimation.filter import Filter, Posterior
 from physics_prior.estimation.history import START_WINDOW, History, Node
 from physics_prior.estimation.measurement import Measurement, SwitchCommand, command_topic
-from physics_prior.estimation.process import PROCESSES
+from physics_prior.estimation.processes import PROCESSES
 from physics_prior.estimation.readout import force_errors
 from physics_prior.estimation.start import start
 from physics_prior.estimation.switching import active_at_start
@@ -161,9 +161,11 @@ class Estimator:
             pair = []
             for sign in (DIFFERENCE, -DIFFERENCE):
                 state = process.displace(here, sign * column)
+                process.enter(state)
                 vdot = state.acceleration if len(state.acceleration) else None
                 pair.append(simulator.wrench_array(state.q, state.v, vdot))
             total += ((pair[0] - pair[1]) / (2.0 * DIFFERENCE)) ** 2
+        process.enter(here)
         return np.sqrt(total)
 
     def health_of(self, posterior: Posterior, stamp: int) -> Health:

@@ -103,6 +103,7 @@ class Filter:
         """Have the simulator hold what the posterior holds, at its time."""
         self.simulator.switches.holds = posterior.holds
         self.simulator.time = (posterior.stamp - posterior.begun) * 1e-9
+        self.process.enter(posterior.state)
 
     def key(self, measurement: Measurement) -> tuple[int, int]:
         """What measurements are ordered by: their stamp, and where it is the same, their topic's place in the scene."""
@@ -173,11 +174,12 @@ class Filter:
             state = self.process.displace(prior.state, last.correction)
             if np.max(np.abs(last.correction - from_prior)) < 1e-3 * SMALL_CORRECTION:
                 break
-        self.constrain(state, last.factor)
+        state, factor = self.process.settle(state, last.factor)
+        self.constrain(state, factor)
         return Posterior(
             prior.stamp,
             state,
-            last.factor,
+            factor,
             accepted=prior.stamp,
             used=True,
             nis=gain.nis,
@@ -206,3 +208,4 @@ class Filter:
             switches = self.simulator.switches
             switches.holds = switches.recaught(state.q)
             self.simulator.constrain(state.q, state.v, factor)
+        self.process.admit(state, factor)

@@ -7,8 +7,7 @@ ch. 6.2.3); it is what physics is measured against.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -25,14 +24,23 @@ from physics_prior.scene import Scene
 
 @dataclass(eq=False)
 class State:
-    """A state on the manifold: q (nq,), v (nv,) and, for the kinematic process, the acceleration (nv,), else empty."""
+    """A state on the manifold.
+
+    Attributes:
+        q, v: (nq,) and (nv,).
+        acceleration: (nv,) of the kinematic process, else empty.
+        force: (nf,) unknown forces of the process with such (forced_process.py), else empty.
+        grounded: (feet,) bool, which of its feet stand.
+    """
 
     q: np.ndarray
     v: np.ndarray
     acceleration: np.ndarray
+    force: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    grounded: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def copy(self) -> "State":
-        return State(self.q.copy(), self.v.copy(), self.acceleration.copy())
+        return State(self.q.copy(), self.v.copy(), self.acceleration.copy(), self.force.copy(), self.grounded.copy())
 
 
 class Process(Protocol):
@@ -43,8 +51,17 @@ class Process(Protocol):
     def start(self, q: np.ndarray, v: np.ndarray) -> State:
         """A state from configuration and velocity."""
 
-    def start_factor(self) -> np.ndarray:
+    def start_factor(self, state: State) -> np.ndarray:
         """(n - 2 nv,) standard deviations of what else it keeps, before the first measurement."""
+
+    def enter(self, state: State) -> None:
+        """Have the simulator know what of a state is neither configuration nor velocity."""
+
+    def settle(self, state: State, factor: np.ndarray) -> tuple[State, np.ndarray]:
+        """State and factor after a measurement, when it is decided anew what stands on the ground."""
+
+    def admit(self, state: State, factor: np.ndarray) -> bool:
+        """Move a state in place, as its factor lets it, to where forces are possible; return whether it had to be."""
 
     def advance(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
         """Move the state in place by h seconds; return its derivative F (n, n) and a noise factor G (n, g)."""
@@ -72,13 +89,25 @@ def steps(seconds: float, size: float) -> tuple[int, float]:
     return count, seconds / count
 
 
-class _OnManifold(ABC):
+class OnManifold(ABC):
+    """What process models share: errors are displacements on the manifold."""
+
     def __init__(self, scene: Scene, simulator: Simulator, n: int) -> None:
         self.scene, self.simulator, self.n = scene, simulator, n
 
     @abstractmethod
     def advance(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
         """As ``Process.advance``."""
+
+    def enter(self, state: State) -> None:
+        if len(state.force):
+            self.simulator.unknown.force = state.force
+
+    def settle(self, state: State, factor: np.ndarray) -> tuple[State, np.ndarray]:
+        return state, factor
+
+    def admit(self, state: State, factor: np.ndarray) -> bool:
+        return False
 
     def carry(self, state: State, factor: np.ndarray, h: float) -> np.ndarray:
         F, G = self.advance(state, h)
@@ -102,43 +131,60 @@ class _OnManifold(ABC):
         return np.concatenate([turn, end.v - start.v, end.acceleration - start.acceleration])
 
 
-class PhysicsProcess(_OnManifold):
+class WhiteForces:
+    """The white generalized forces of a scene: its own, and those that its effects put on points."""
+
+    def __init__(self, scene: Scene, simulator: Simulator) -> None:
+        self._own = np.diag(scene.noise.force)
+        self._of_effects = PointForces(simulator)
+
+    @property
+    def turning(self) -> bool:
+        """Whether their directions turn with the state."""
+        return self._of_effects.count > 0
+
+    @property
+    def any(self) -> bool:
+        """Whether there are any."""
+        return self.turning or bool(self._own.any())
+
+    def factor(self, state: State) -> np.ndarray:
+        """(nv, nv): a factor of the density of the white generalized forces."""
+        return lower_factor(self.columns(state)) if self.turning else self._own
+
+    def columns(self, state: State) -> np.ndarray:
+        """(nv, g): what generalized forces the independent white ones make, the scene's own first."""
+        return np.hstack([self._own, self._of_effects.columns(state.q, state.v)])
+
+
+class PhysicsProcess(OnManifold):
     """The scene's own step, with its analytic derivatives; noise is an unknown generalized force."""
 
     def __init__(self, scene: Scene, simulator: Simulator) -> None:
         super().__init__(scene, simulator, 2 * simulator.nv)
-        self._own_noise = np.diag(scene.noise.force)
-        self._effects_noise = PointForces(simulator)
+        self._white = WhiteForces(scene, simulator)
 
     def start(self, q: np.ndarray, v: np.ndarray) -> State:
         return State(q, v, np.zeros(0))
 
-    def start_factor(self) -> np.ndarray:
+    def start_factor(self, state: State) -> np.ndarray:
         return np.zeros(0)
 
     def advance(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
-        return self.simulator.linearise(state.q, state.v, h, self._noise(state))
+        return self.simulator.linearise(state.q, state.v, h, self._white.factor(state))
 
     def carry(self, state: State, factor: np.ndarray, h: float) -> np.ndarray:
         if len(self.simulator.candidates):
-            return events.carry(self.simulator, state.q, state.v, factor, self._columns(state), h)
-        return carry_step(self.simulator, state.q, state.v, h, factor, self._noise(state))
+            return events.carry(self.simulator, state.q, state.v, factor, self._white.columns(state), h)
+        return carry_step(self.simulator, state.q, state.v, h, factor, self._white.factor(state))
 
     def predict(self, state: State, factor: np.ndarray, h: float, count: int) -> np.ndarray:
         if len(self.simulator.candidates):
             return super().predict(state, factor, h, count)
-        once = self._effects_noise.count > 0  # their directions turn with the state
+        once = self._white.turning
         for _ in range(count if once else 1):
-            factor = carry(self.simulator, state.q, state.v, h, 1 if once else count, factor, self._noise(state))
+            factor = carry(self.simulator, state.q, state.v, h, 1 if once else count, factor, self._white.factor(state))
         return factor
-
-    def _noise(self, state: State) -> np.ndarray:
-        """(nv, nv): a factor of the density of the white generalized forces."""
-        return lower_factor(self._columns(state)) if self._effects_noise.count else self._own_noise
-
-    def _columns(self, state: State) -> np.ndarray:
-        """(nv, g): what generalized forces the independent white ones make, the scene's own first."""
-        return np.hstack([self._own_noise, self._effects_noise.columns(state.q, state.v)])
 
 
 class FrozenProcess(PhysicsProcess):
@@ -148,13 +194,13 @@ class FrozenProcess(PhysicsProcess):
         if count == 1 or len(self.simulator.candidates):
             return super().predict(state, factor, h, count)
         ahead, begin = state.copy(), self.simulator.time
-        factor = carry(self.simulator, ahead.q, ahead.v, count * h, 1, factor, self._noise(state))
+        factor = carry(self.simulator, ahead.q, ahead.v, count * h, 1, factor, self._white.factor(state))
         self.simulator.time = begin
         self.simulator.advance(state.q, state.v, h, count)
         return factor
 
 
-class KinematicProcess(_OnManifold):
+class KinematicProcess(OnManifold):
     """Constant acceleration of every degree of freedom, driven by white jerk; knows neither mass nor constraint."""
 
     def __init__(self, scene: Scene, simulator: Simulator) -> None:
@@ -163,7 +209,7 @@ class KinematicProcess(_OnManifold):
     def start(self, q: np.ndarray, v: np.ndarray) -> State:
         return State(q, v, np.zeros(len(v)))
 
-    def start_factor(self) -> np.ndarray:
+    def start_factor(self, state: State) -> np.ndarray:
         return 10.0 * self.scene.noise.velocity
 
     def advance(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
@@ -176,11 +222,3 @@ class KinematicProcess(_OnManifold):
         F[index, 2 * nv + index] = 0.5 * h * h
         moments = np.array([[h**5 / 20, h**4 / 8, h**3 / 6], [h**4 / 8, h**3 / 3, h**2 / 2], [h**3 / 6, h**2 / 2, h]])
         return F, np.kron(np.linalg.cholesky(moments), np.diag(self.scene.noise.jerk))
-
-
-PROCESSES: dict[str, Callable[[Scene, Simulator], Process]] = {
-    "physics": PhysicsProcess,
-    "frozen": FrozenProcess,
-    "kinematic": KinematicProcess,
-}
-"""The process models, by the name that ``--process`` knows them by."""

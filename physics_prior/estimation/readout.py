@@ -116,10 +116,12 @@ def _deviations(
         pair = []
         for sign in (DIFFERENCE, -DIFFERENCE):
             state = process.displace(here, sign * column)
+            process.enter(state)
             pair.append(evaluate(readouts, simulator, state.q, state.v, measured_acceleration(state.acceleration)))
         for name in pair[0]:
             slope = difference(pair[0][name], pair[1][name], _is_angle(readouts, name)) / (2.0 * DIFFERENCE)
             total[name] = total[name] + slope**2
+    process.enter(here)
     return {name: np.sqrt(square) for name, square in total.items()}
 
 

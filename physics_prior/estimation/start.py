@@ -79,7 +79,7 @@ def posterior_at(
     state = filter.process.start(q, np.zeros(nv))
     factor = np.zeros((n, n))
     factor[:nv, :nv] = factor_q
-    deviations = np.concatenate([filter.scene.noise.velocity, filter.process.start_factor()])
+    deviations = np.concatenate([filter.scene.noise.velocity, filter.process.start_factor(state)])
     factor[nv:, nv:] = np.diag(deviations)
     filter.constrain(state, factor)
     holds = filter.simulator.switches.holds

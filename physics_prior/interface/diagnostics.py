@@ -56,4 +56,5 @@ def active_effects(scene: Scene, simulator: Simulator, estimate: Estimate | None
 
 
 def _touching(simulator: Simulator, estimate: Estimate | None) -> list[str]:
-    return [name for name in simulator.touching if estimate is not None and estimate.wrenches[name].acts]
+    names = [*simulator.touching, *(foot.name for foot in simulator.unknown.feet)]
+    return [name for name in names if estimate is not None and estimate.wrenches[name].acts]

@@ -110,7 +110,8 @@ def _forces(header: Header, forces: list[str], estimate: Estimate, size: float, 
 
 
 def _touching(simulator: Simulator, estimate: Estimate) -> dict[str, bool]:
-    return {name: estimate.wrenches[name].acts for name in simulator.touching}
+    feet = [foot.name for foot in simulator.unknown.feet]
+    return {name: estimate.wrenches[name].acts for name in [*simulator.touching, *feet]}
 
 
 def _holding(simulator: Simulator, estimate: Estimate) -> dict[str, bool]:

@@ -9,6 +9,7 @@ from pydantic import BaseModel
 from physics_prior.dynamics.compose import kinds_of_rows
 from physics_prior.effects import REGISTRY, Effect
 from physics_prior.effects.plug_ins import effect_loaders
+from physics_prior.effects.unknown_force import check_together
 from physics_prior.errors import PhysicsPriorError, SceneError
 from physics_prior.model import Tree
 from physics_prior.resources import scene_path
@@ -106,6 +107,10 @@ def _read_effects(place: Place, tree: Tree) -> tuple[Effect, ...]:
         if held and effect.label in joints:
             raise inner.inside(("name",)).error(f"'{effect.label}' is a joint's name: give this effect its own")
         effects.append(effect)
+        try:
+            check_together(tree, effects)
+        except PhysicsPriorError as error:
+            raise relocate(inner, error, known) from None
     return tuple(effects)
 
 

@@ -13,7 +13,7 @@ from physics_prior.dynamics.simulator import Simulator
 from physics_prior.errors import PhysicsPriorError
 from physics_prior.estimation.filter import Filter
 from physics_prior.estimation.measurement import PoseMeasurement
-from physics_prior.estimation.process import PROCESSES
+from physics_prior.estimation.processes import PROCESSES
 from physics_prior.estimation.start import posterior_at
 
 PERIOD = 10_000_000  # ns between measurements

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from physics_prior.dynamics.simulator import Simulator
-from physics_prior.estimation.process import PROCESSES, KinematicProcess, PhysicsProcess, State, steps
+from physics_prior.estimation.process import KinematicProcess, PhysicsProcess, State, steps
+from physics_prior.estimation.processes import PROCESSES
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -115,7 +116,7 @@ def test_kinematic_process_moves_by_its_acceleration(shipped):
     process.advance(state, 0.1)
     np.testing.assert_allclose(state.q, [0.1 + 0.1 + 0.01, 0.2 - 0.1 + 0.015])
     np.testing.assert_allclose(state.v, [1.2, -0.7])
-    assert len(process.start_factor()) == 2
+    assert len(process.start_factor(state)) == 2
     assert isinstance(_process(shipped("double_pendulum"), "physics"), PhysicsProcess)
 
 

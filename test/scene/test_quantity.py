@@ -103,6 +103,7 @@ def test_every_number_of_the_built_in_effects_states_its_unit():
         "hinge": {"axis", "to_axis"},
         "weld": {"orientation"},
         "joint_limit": {"restitution", "restitution_deviation"},
+        "ground_reaction": {"friction"},
         "contact": {
             *("orientation", "to_orientation", "friction", "restitution"),
             *("friction_deviation", "restitution_deviation", "impulse_deviation"),

@@ -1,0 +1,114 @@
+"""Physics with unknown forces: muscles and what the ground does to feet are states beside configuration and velocity.
+
+The state is x = (q, v, f). Over a step of h seconds f is constant; the scene's own step and its derivatives know it as any
+other force. Its errors go on as
+    d(q, v) = F d(q, v) + h/2 (1 + F) [0; M^-1 D] df,  df = exp(-h/T) df + w,  w of variance s^2 (1 - exp(-2 h/T)),
+with D f the generalized forces of f: the Ornstein-Uhlenbeck process of each about its mean (Maybeck 1979, ch. 4.11).
+
+Muscles hold the posture against what the ground does: the noise of a foot's wrench w comes with torques that leave the
+accelerations of the joints as they are, so that a surprise under the foot moves the whole body, not the foot alone.
+"""
+
+import numpy as np
+
+from physics_prior.dynamics.compose import GRAVITY
+from physics_prior.dynamics.simulator import Simulator
+from physics_prior.estimation import ground
+from physics_prior.estimation.process import OnManifold, State, WhiteForces
+from physics_prior.scene import Scene
+
+
+class ForcedProcess(OnManifold):
+    """The scene's own step with unknown forces (dynamics/unknown_forces.py); n = 2 nv + nf."""
+
+    def __init__(self, scene: Scene, simulator: Simulator) -> None:
+        super().__init__(scene, simulator, 2 * simulator.nv + simulator.unknown.count)
+        self.unknown, self.nv = simulator.unknown, simulator.nv
+        self._white = WhiteForces(scene, simulator)
+        self._passive = np.setdiff1d(np.arange(self.nv), self.unknown.freedoms)
+        gravity = simulator.memory.parameters[:GRAVITY]
+        self._weight = simulator.tree.mass * float(np.linalg.norm(gravity))
+        self.scale = max(self._weight, 1.0)
+
+    def start(self, q: np.ndarray, v: np.ndarray) -> State:
+        force = np.zeros(self.unknown.count)
+        state = State(q, v, np.zeros(0), force, np.zeros(len(self.unknown.feet), dtype=bool))
+        self.simulator.move(q, v)
+        for index, foot in enumerate(self.unknown.feet):
+            state.grounded[index] = ground.stands(
+                self.simulator, foot, state, False, False, np.zeros((self.nv, 1)), 0.0
+            )
+        force[:] = self._mean(state)
+        return state
+
+    def start_factor(self, state: State) -> np.ndarray:
+        return np.where(self._acting(state), self.unknown.deviation, 0.0)
+
+    def advance(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
+        nv, nf = self.nv, self.unknown.count
+        self.enter(state)
+        M = self.simulator.mass_matrix(state.q)
+        D = self.unknown.columns(self.simulator)
+        response = np.linalg.solve(M, D)
+        forgotten = np.exp(-h / self.unknown.time_constant)
+        F = np.zeros((self.n, self.n))
+        noise = self._force_noise(state, M, D, h)
+        F[: 2 * nv, : 2 * nv], white = self.simulator.linearise(state.q, state.v, h, self._white.factor(state))
+        F[: 2 * nv, 2 * nv :] = 0.5 * h * F[: 2 * nv, nv : 2 * nv] @ response
+        F[nv : 2 * nv, 2 * nv :] += 0.5 * h * response
+        F[2 * nv :, 2 * nv :] = np.diag(forgotten)
+        mean = self._mean(state)
+        state.force = mean + forgotten * (state.force - mean)
+        columns = white.shape[1] if self._white.any else 0
+        G = np.zeros((self.n, columns + nf))
+        G[: 2 * nv, :columns] = white[:, :columns]
+        G[2 * nv :, columns:] = noise
+        return F, G
+
+    def predict(self, state: State, factor: np.ndarray, h: float, count: int) -> np.ndarray:
+        factor = super().predict(state, factor, h, count)
+        self.admit(state, factor)
+        return factor
+
+    def displace(self, state: State, error: np.ndarray) -> State:
+        nv = self.nv
+        q = self.simulator.displaced(state.q, error[:nv])
+        force = state.force + error[2 * nv :]
+        return State(q, state.v + error[nv : 2 * nv], state.acceleration, force, state.grounded)
+
+    def difference(self, start: State, end: State) -> np.ndarray:
+        return np.concatenate([super().difference(start, end), end.force - start.force])
+
+    def settle(self, state: State, factor: np.ndarray) -> tuple[State, np.ndarray]:
+        return ground.settle(self, state, factor)
+
+    def admit(self, state: State, factor: np.ndarray) -> bool:
+        return ground.admit(self, state, factor)
+
+    def _acting(self, state: State) -> np.ndarray:
+        """(nf,) bool: which unknown forces there are; those of feet off the ground are not."""
+        acting = np.ones(self.unknown.count, dtype=bool)
+        for foot, grounded in zip(self.unknown.feet, state.grounded, strict=True):
+            acting[foot.span] = grounded
+        return acting
+
+    def _mean(self, state: State) -> np.ndarray:
+        """(nf,) N or N m, to which forces return: the weight, in equal shares under the feet that stand; no torque."""
+        mean = np.zeros(self.unknown.count)
+        for foot, grounded in zip(self.unknown.feet, state.grounded, strict=True):
+            if grounded:
+                mean[foot.span.start + 2] = self._weight / np.count_nonzero(state.grounded)
+        return mean
+
+    def _force_noise(self, state: State, M: np.ndarray, D: np.ndarray, h: float) -> np.ndarray:
+        """(nf, nf) factor of the noise that a step of h seconds adds to the forces."""
+        own = self.unknown
+        noise = np.diag(own.deviation * np.sqrt(1.0 - np.exp(-2.0 * h / own.time_constant)))
+        noise *= self._acting(state)
+        if len(own.torques):
+            passive, held = self._passive, own.freedoms
+            for foot in own.feet:
+                pushed = D[:, foot.span] @ noise[foot.span, foot.span]
+                moved = np.linalg.solve(M[np.ix_(passive, passive)], pushed[passive])
+                noise[own.torques, foot.span] = M[np.ix_(held, passive)] @ moved - pushed[held]
+        return noise

@@ -134,7 +134,7 @@ def test_a_subject_that_is_none_is_refused(subject, words, capsys, tmp_path):
 def test_the_shipped_scene_is_what_the_command_writes(tmp_path, capsys):
     """But for the last digit, which the machine's linear algebra may round otherwise."""
     again = tmp_path / "walk_bmc.yaml"
-    words = ["--subject", "mass=77.2,sex=male", "--markers", MARKERS]
+    words = ["--subject", "mass=77.2,sex=male", "--markers", MARKERS, "--forces"]
     assert main(["calibrate", str(BAGS / "bmc_walk1"), *words, "-o", str(again)]) == 0
     assert "told by" in capsys.readouterr().out
     new, old = load_scene(again), load_scene(scene_path("walk_bmc"))

@@ -51,7 +51,7 @@ def noisier(scene: Scene) -> Scene:
 @pytest.mark.slow
 def test_a_bad_day_does_not_lose_the_walker():
     """Gaps are bridged, and innovations are as large as expected of the noise, gated ones left out."""
-    scene = load_scene("walk_lemouel")
+    scene = load_scene("walk_lemouel_tracking")
     frames = read_measurements(BAG, scene)
     bad, lost = degraded(frames, np.random.default_rng(6))
     estimator = Estimator(noisier(scene))

@@ -12,8 +12,8 @@ Examples:
 import argparse
 from pathlib import Path
 
-from physics_prior.commands.replay import add_estimation
-from physics_prior.commands.terminal import console, progress, require_plot_folder, whole_file
+from physics_prior.commands.replay import add_estimation, replayed
+from physics_prior.commands.terminal import console, require_plot_folder, whole_file
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,30 +27,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Replay the bag and draw; 0."""
     folder = args.output or Path(f"{args.bag.resolve().stem}_plots")
-    from physics_prior.commands.compilation import compiling
-    from physics_prior.interface.warm_up import warm_up
+    from physics_prior.commands.compilation import load_settled
     from physics_prior.recording.reader import open_bag
     from physics_prior.recording.references import plates_of
-    from physics_prior.recording.replay import replay
-    from physics_prior.scene import load_scene
     from physics_prior.studies.plot import plot_replay
     from physics_prior.studies.plot_motion import plot_figures, plot_forces, plot_joints
 
-    scene = load_scene(args.scene)
+    scene, _ = load_settled(args.scene)
     references = args.reference or plates_of(open_bag(args.bag), scene)
     require_plot_folder(folder, "-o")
-    with compiling(scene, "carry"):
-        warm_up(scene)
-    with progress(f"replaying {args.bag.name}") as report:
-        result = replay(
-            args.bag,
-            scene,
-            smooth=args.smooth,
-            lag=args.lag,
-            process=args.process,
-            references=references,
-            progress=report,
-        )
+    result = replayed(args, scene, references)
     drawings = {
         "joints.png": plot_joints,
         "figures.png": plot_figures,

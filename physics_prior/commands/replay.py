@@ -14,9 +14,15 @@ Examples:
 
 import argparse
 import math
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from physics_prior.commands.terminal import STDOUT, progress, require_folder, whole_file, write_json
+
+if TYPE_CHECKING:
+    from physics_prior.recording.replay import ReplayResult
+    from physics_prior.scene import Scene
 
 LONGEST_LAG = 3600.0  # s
 
@@ -72,33 +78,42 @@ def lag(text: str) -> float:
     return seconds
 
 
+def replayed(
+    args: argparse.Namespace, scene: "Scene", references: Sequence[str], out: Path | None = None
+) -> "ReplayResult":
+    """Replay with the arguments of ``add_estimation``, and tell how far it is."""
+    from physics_prior.commands.compilation import compiling
+    from physics_prior.interface.warm_up import warm_up
+    from physics_prior.recording.replay import replay
+
+    with compiling(scene, "carry"):
+        warm_up(scene)
+    with progress(f"replaying {args.bag.name}") as report:
+        return replay(
+            args.bag,
+            scene,
+            out=out,
+            smooth=args.smooth,
+            lag=args.lag,
+            process=args.process,
+            references=references,
+            progress=report,
+        )
+
+
 def run(args: argparse.Namespace) -> int:
     """Replay the bag; 0."""
     require_folder("--json", args.json)
     require_folder("--plot", args.plot)
-    from physics_prior.commands.compilation import compiling, load_settled
+    from physics_prior.commands.compilation import load_settled
     from physics_prior.commands.replay_report import print_report
-    from physics_prior.interface.warm_up import warm_up
-    from physics_prior.recording.replay import replay
 
     if args.plot is not None:
         from physics_prior.studies.plot import plot_replay, require_format
 
         require_format(Path(args.plot))
     scene, _ = load_settled(args.scene)
-    with compiling(scene, "carry"):
-        warm_up(scene)
-    with progress(f"replaying {args.bag.name}") as report:
-        result = replay(
-            args.bag,
-            scene,
-            out=args.output,
-            smooth=args.smooth,
-            lag=args.lag,
-            process=args.process,
-            references=args.reference,
-            progress=report,
-        )
+    result = replayed(args, scene, args.reference, args.output)
     if args.plot is not None:
         with whole_file(Path(args.plot)) as partial:
             plot_replay(result, partial)

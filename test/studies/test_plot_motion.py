@@ -9,7 +9,9 @@ from physics_prior.model import Tree
 from physics_prior.model.ball_hinges import hinge_angles
 from physics_prior.model.coordinates import coordinate_errors, coordinates
 from physics_prior.recording.replay import ReplayResult
+from physics_prior.resources import scene_path
 from physics_prior.scene import load_scene
+from physics_prior.stepping import kept
 from physics_prior.studies.plot_motion import _sticks, plot_figures, plot_forces, plot_joints
 
 
@@ -87,3 +89,15 @@ def test_the_command_writes_what_the_bag_has(tmp_path, capsys):
     (tmp_path / "taken").write_text("")
     assert cli.main(["plot", str(tmp_path / "bag"), "--scene", "pendulum", "-o", str(tmp_path / "taken")]) == 2
     assert "give a folder" in capsys.readouterr().err
+
+
+def test_the_command_steps_as_the_accuracy_wants_that_a_scene_asks_for(tmp_path):
+    """It refused: the step was not chosen yet."""
+    (tmp_path / "asks.yaml").write_text(scene_path("pendulum").read_text() + "\naccuracy: {tolerance: 1e-3 m}\n")
+    scene = load_scene(tmp_path / "asks.yaml")
+    assert scene.accuracy is not None
+    kept.path_of(scene).unlink(missing_ok=True)
+    assert cli.main(["simulate", "pendulum", "-o", str(tmp_path / "bag"), "--duration", "0.5"]) == 0
+    words = ["plot", str(tmp_path / "bag"), "--scene", str(tmp_path / "asks.yaml"), "-o", str(tmp_path / "pictures")]
+    assert cli.main(words) == 0
+    assert kept.read(scene) is not None

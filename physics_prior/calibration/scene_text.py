@@ -5,6 +5,7 @@ import math
 import textwrap
 
 import numpy as np
+from scipy import constants
 
 from physics_prior.calibration.person import Calibration
 from physics_prior.dynamics.simulator import Simulator
@@ -17,7 +18,6 @@ BESIDE = 50.0  # rad/s^2 sqrt(s): accelerations of a joint by what is not modell
 MUSCLE = 3000.0  # rad/s^3 sqrt(s): jerk of a joint by its muscles
 CONSTANT = 1.0  # s, over which torques of muscles and forces of the ground are forgotten
 VERTICAL, HORIZONTAL, MOMENT = 1.0, 0.2, 0.08  # of the ground's force, of the weight; of its moment, m of the weight
-STANDARD_GRAVITY = 9.80665
 TONE = 10.0  # 1/s: what joints that no marker tells come to rest by
 
 
@@ -133,7 +133,7 @@ def _white(found: Calibration, ease: np.ndarray, forces: bool) -> str:
 
 
 def _feet(found: Calibration) -> str:
-    weight = found.human.mass * STANDARD_GRAVITY
+    weight = found.human.mass * constants.g
     strength = f"vertical: {VERTICAL * weight:.0f} N, horizontal: {HORIZONTAL * weight:.0f} N, moment: {MOMENT * weight:.0f} N m"
     return "\n".join(
         f"  - ground_reaction: {{name: {side}_sole, part: {side}_sole, {strength}, time_constant: {CONSTANT:g} s}}"

@@ -211,7 +211,7 @@ class Switches:
         if not (np.isfinite(q).all() and np.isfinite(v).all()):
             raise SimulationError(f"{self.furthest()} cannot take hold: {UNLIKE}")
         if not left <= ASSEMBLED:
-            self._require_alike(before)
+            self.require_alike(before)
             raise SimulationError(
                 f"{self.furthest()} cannot take hold: {left:.3g} m stay between the points that it joins"
             )
@@ -220,7 +220,7 @@ class Switches:
                 f"'{self.labels[index]}' cannot take hold: its part is held by others half a turn away"
             )
         impulses = self._impulses()
-        self._require_alike(q)
+        self.require_alike(q)
         moved = float(np.max(np.abs(simulator.tree.difference(before, q)), initial=0.0))
         after = _kinetic_energy(simulator, q, v)
         if not np.any(simulator.memory.pairs["motion"]):
@@ -231,9 +231,9 @@ class Switches:
                 v *= np.sqrt(energy / after)
         return impulses
 
-    def _require_alike(self, q: np.ndarray) -> None:
+    def require_alike(self, q: np.ndarray) -> None:
         """Raise SimulationError if at q the masses lose a direction that what holds has as levers."""
-        index = unlike(self._simulator, q)
+        index = unlike(self._simulator, q) if self._simulator.rows else None
         if index is not None:
             raise SimulationError(f"'{self.labels[index]}' cannot take hold: {UNLIKE}")
 

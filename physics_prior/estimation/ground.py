@@ -23,7 +23,7 @@ INFORMED = 1e-9  # of the largest deviation of a foot's forces: below it, they a
 SURE = 2.0  # standard deviations
 CLEARLY = 2.0  # times as high or fast as what may be off the ground: whatever it seems to carry
 SWEEPS = 10  # over the inequalities that are not kept
-LEAST_TILT = 0.1  # cosine: a sole that is more upright stands on its edge, of this share of its length
+LEAST_TILT = 0.1  # cosine: a sole that is more upright stands on an edge of this share of its shorter side
 
 
 def stands(
@@ -103,10 +103,8 @@ def bounds(simulator: Simulator, foot: Foot, wrench: np.ndarray) -> np.ndarray:
     rows[1, :3] = -along[0], -along[1], sole.friction
     # vertical force times the centre of pressure less the point under the middle
     lever = np.array([[drop, 0.0, 0.0, 0.0, -1.0, 0.0], [0.0, drop, 0.0, 1.0, 0.0, 0.0]])
-    edges = R[:2, :2] * sole.half
-    lengths = np.linalg.norm(edges, axis=0)
-    edges = edges * np.maximum(1.0, LEAST_TILT * sole.half / np.maximum(lengths, 1e-12))
-    across = np.linalg.inv(edges) @ lever
+    U, s, Vt = np.linalg.svd(R[:2, :2] * sole.half)  # the sole seen from above
+    across = (Vt.T / np.maximum(s, LEAST_TILT * np.min(sole.half))) @ U.T @ lever
     for axis in range(2):
         for sign in (1.0, -1.0):
             row = rows[2 + 2 * axis + (sign < 0.0)]

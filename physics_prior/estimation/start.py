@@ -70,6 +70,9 @@ def posterior_at(
     """A starting posterior: configuration q with factor (nv, nv), at rest with the scene's velocity deviation.
 
     Arguments else as of ``start``. What holds its part wherever it is takes hold last.
+
+    Raises:
+        SimulationError: the masses that something holds are too unlike for its force to be told from rounding.
     """
     begun = stamp if begun is None else begun
     if active is None:
@@ -82,6 +85,8 @@ def posterior_at(
     deviations = np.concatenate([filter.scene.noise.velocity, filter.process.start_factor(state)])
     factor[nv:, nv:] = np.diag(deviations)
     filter.constrain(state, factor)
+    if filter.constrained:
+        filter.simulator.switches.require_alike(state.q)
     holds = filter.simulator.switches.holds
     posterior = Posterior(stamp, state, factor, accepted=stamp, used=True, start=True, begun=begun, holds=holds)
     for index, on in enumerate(active):

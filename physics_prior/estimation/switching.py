@@ -107,6 +107,7 @@ def take_hold(filter: "Filter", posterior: "Posterior", index: int) -> Grip:
     left = assemble(simulator, state.q, state.v.copy())
     if not left <= ASSEMBLED or turned_over(simulator):
         raise SimulationError(f"'{switches.labels[index]}' could not take hold: {left:.3g} m were left, or half a turn")
+    switches.require_alike(state.q)
     F = np.zeros((2 * nv, 2 * nv))
     F[:nv, :nv] = np.eye(nv)
     F[nv:] = _impulse_derivative(simulator, state)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 import numpy as np
+from scipy import constants
 from scipy.stats import chi2
 
 from physics_prior import rotations
@@ -12,7 +13,6 @@ from physics_prior.interface.geometry import point_of, pose_of, vector_of
 from physics_prior.model import Part, Tree
 from physics_prior.recording.messages import ColorRGBA, Header, Marker, MarkerArray, Pose, Vector3
 
-STANDARD_GRAVITY = 9.80665  # m/s^2: a force of all parts' weight is drawn as long as the largest part
 SHAFT, HEAD, DOT = 0.04, 0.1, 0.08  # diameters of an arrow and of a point of contact, of the size of the model
 LEAST_ARROW, LEAST_AXIS = 1e-3, 1e-3  # drawn: of the size of the model
 PROBABILITY = 0.95  # that the true point is inside its ellipsoid
@@ -94,7 +94,8 @@ def _forces(header: Header, forces: list[str], estimate: Estimate, size: float, 
     thickness = Vector3(SHAFT * size, HEAD * size, 0.0)
     for index, name in enumerate(forces):
         wrench = estimate.wrenches[name]
-        arrow = wrench.force * (size / (mass * STANDARD_GRAVITY))
+        # a force of all parts' weight is drawn as long as the largest part
+        arrow = wrench.force * (size / (mass * constants.g))
         shown = float(np.linalg.norm(arrow)) > LEAST_ARROW * size
         yield Marker(
             header,

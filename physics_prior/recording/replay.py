@@ -235,13 +235,11 @@ class _Replay:
         settled = posterior.stamp - self.first_stamp >= FROM_SECONDS * NANOSECONDS
         if settled:
             self._compare(posterior, vdot)
-        if self.writer is None and not (settled and self.force_score):
-            return
-        estimate = self.estimator.describe(posterior)
         if settled and self.force_score is not None:
-            self.force_score.add(estimate.stamp, estimate.q, estimate.v, estimate.wrenches)
+            self.estimator.filter.enter(posterior)
+            self.force_score.add(posterior.stamp, state.q, state.v, self.simulator.wrenches(state.q, state.v, vdot))
         if self.writer is not None:
-            self._file(estimate, log_time, health)
+            self._file(self.estimator.describe(posterior), log_time, health)
 
     def _compare(self, posterior: Posterior, vdot: np.ndarray | None) -> None:
         if self.reference is None or self.score is None:

@@ -6,6 +6,7 @@ from scipy.linalg import expm
 from scipy.stats import chi2
 
 from physics_prior import rotations
+from physics_prior.errors import SceneError
 from physics_prior.estimation import ground
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.estimation.measurement import JointsMeasurement, PointsMeasurement, PoseMeasurement
@@ -241,6 +242,28 @@ def test_forces_are_such_as_the_ground_can_exert(process, standing, seed):
     same = state.copy()
     assert not process.admit(same, factor)
     np.testing.assert_allclose(same.force, state.force, atol=1e-9)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.7, 0.5 * np.pi])
+def test_a_sole_that_stands_on_edge_has_bounds(process, standing, yaw):
+    """Seen from above it is a line: bounds were 1e16 times too steep, or the matrix of its sides singular."""
+    state, upright = standing.copy(), rotations.exp(np.array([0.5 * np.pi, 0.0, 0.0]))
+    state.q[3:7] = rotations.multiply(upright, rotations.exp(np.array([0.0, 0.0, yaw])))
+    process.simulator.move(state.q, state.v)
+    (foot, _), wrench = process.unknown.feet, np.array([0.0, 0.0, 300.0, 0.0, 0.0, 0.0])
+    rows = ground.bounds(process.simulator, foot, wrench)
+    assert np.max(np.abs(rows)) < 1e4  # 1 / m: over a tenth of the shorter side, by the height
+    assert (rows[0] @ wrench, rows[1] @ wrench) == (300.0, 300.0 * foot.sole.friction)
+    assert np.isfinite(ground.borne(process.simulator, foot, 10.0 + wrench)).all()
+
+
+@pytest.mark.parametrize("name", ["kinematic", "frozen"])
+def test_processes_that_find_no_unknown_forces_say_so(scene, name):
+    """They left the feet empty, and published that as what the ground does."""
+    with pytest.raises(
+        SceneError, match=rf"process '{name}' finds no unknown forces.*'muscle', 'left_sole', 'right_sole'"
+    ):
+        PROCESSES[name](scene, scene.simulator())
 
 
 BLOCK = """

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from physics_prior import rotations
+from physics_prior.estimation.estimator import Estimator
 from physics_prior.estimation.measurement import OrientationMeasurement, PoseMeasurement
 from physics_prior.estimation.start import start
 from physics_prior.recording.simulate import motion
@@ -126,3 +127,21 @@ def test_measurements_that_contradict_each_other_are_no_start(shipped, filter_of
     upper, lower = moments_of(scene)[0].measurements
     wrong = replace(lower, position=lower.position + 0.3)
     assert start(filter_of(scene), [upper, wrong], upper.stamp) is None
+
+
+def test_what_rounding_cannot_hold_is_refused_by_name_as_in_simulation(scene_file):
+    """1 kg of 1e-12 kg m^2, held off its centre (test/properties/test_kept_scenes.py): the estimator went on with it."""
+    scene = scene_file(
+        """
+        description: A speck that is held by a long arm.
+        model: {parts: {speck: {mass: 1, inertia: 1e-12, joint: free}}}
+        effects: [gravity, attachment: {name: hold, part: speck, point: [0, 0, 1], at: [0, 0, 1]}]
+        measurements: [pose: {topic: /speck, part: speck, position_noise: 1 mm, orientation_noise: 1 deg}]
+        noise: {force: 1e-3}
+        """
+    )
+    estimator = Estimator(scene)
+    for stamp in (0, 10_000_000, 20_000_000):
+        estimator.add(PoseMeasurement(stamp, "/speck", np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])))
+    assert not estimator.ready
+    assert "'hold' cannot take hold: the masses or inertias" in estimator.last_rejection

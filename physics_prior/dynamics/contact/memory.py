@@ -36,9 +36,8 @@ def contact_memory(
     for each in candidates:
         slots = 1 if each["is_limit"] else SLOTS
         contacts += slots
-        slides = (
-            max(each["friction"], each["friction_deviation"]) > 0.0
-        )  # the estimator may try more friction than none
+        # where it is uncertain, the estimator may try more friction than none
+        slides = max(each["friction"], each["friction_deviation"]) > 0.0
         rows += slots * (1 + 2 * slides + 2 * (each["rolling"] > 0.0))
     m = equalities + rows
     sizes = [

@@ -46,7 +46,14 @@ def run(args: argparse.Namespace) -> int:
     require_folder("--json", args.json)
     if args.plot is not None:
         require_plot_folder(args.plot)
-    from physics_prior.studies.accuracy.card import card, comparison_table, front_table, ratio_table, read_card
+    from physics_prior.studies.accuracy.card import (
+        card,
+        comparison_table,
+        front_table,
+        ratio_table,
+        read_card,
+        unmeasured_table,
+    )
     from physics_prior.studies.accuracy.problem import chosen
     from physics_prior.studies.accuracy.study import run_study
 
@@ -69,6 +76,9 @@ def run(args: argparse.Namespace) -> int:
         out.print(front_table(data))
         if args.peers:
             out.print(ratio_table(data))
+        unmeasured = unmeasured_table(data)
+        if unmeasured.row_count:
+            out.print(unmeasured)
         if before is not None:
             out.print(comparison_table(data, before))
     return 0

@@ -104,6 +104,22 @@ def ratio_table(data: Mapping[str, Any]) -> Table:
     return out
 
 
+def unmeasured_table(data: Mapping[str, Any]) -> Table:
+    """Of every scheme the settings that have no figures, and why."""
+    out = Table(title="Without figures", box=None, pad_edge=False)
+    for name in ("problem", "scheme", "why"):
+        out.add_column(name, header_style="dim")
+    for problem in data["problems"].values():
+        missing: dict[str, dict[str, list[str]]] = {}
+        for point in problem["points"]:
+            if point["outcome"] != "measured":
+                missing.setdefault(point["scheme"], {}).setdefault(point["outcome"], []).append(_step(point))
+        for scheme, outcomes in missing.items():
+            told = "; ".join(f"{outcome} at {', '.join(steps)}" for outcome, steps in outcomes.items())
+            out.add_row(problem["title"], scheme, told)
+    return out
+
+
 def comparison_table(data: Mapping[str, Any], before: Mapping[str, Any]) -> Table:
     """Time of this version over that of an earlier card, by problem and error: below 1 is faster, on a like machine."""
     out = Table(title=f"Time over that of {before['version']}, at equal error", box=None, pad_edge=False)

@@ -10,7 +10,7 @@ def front(points: Sequence[Point]) -> list[Point]:
     """Those that no other beats in both error and time, from coarse and cheap to fine and dear."""
     out: list[Point] = []
     for point in sorted(points, key=lambda each: (each.seconds, each.error)):
-        if not point.lost and (not out or point.error < out[-1].error):
+        if point.measured and (not out or point.error < out[-1].error):
             out.append(point)
     return out
 

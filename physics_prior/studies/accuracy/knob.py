@@ -83,7 +83,7 @@ def turns(problem: Problem, progress: Callable[[float], None] = lambda part: Non
     study = [scheme for scheme in own_schemes(problem) if scheme.engine == "compiled"]
     points = measure(problem, [*study, *asked], lambda part: progress(0.5 + 0.5 * part), ROUNDS)
     front = [point for point in points if point.engine == "compiled"]
-    seconds = {float(point.scheme): point.seconds for point in points if point.engine == "chosen"}
+    seconds = {float(point.scheme): point.seconds for point in points if point.engine == "chosen" and point.measured}
     best = {turn.tolerance: seconds_to_reach(front, turn.tolerance) for turn in out if turn.seconds is None}
     return [
         replace(turn, cost=seconds[turn.tolerance] / reached)

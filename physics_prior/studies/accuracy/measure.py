@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from statistics import median
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from physics_prior.studies.problems.mechanism import Benchmark, Run
 ROUNDS = 3  # of timing, all contestants in turns
 REPEATED = 0.3  # s of processor time, beyond which a run is not repeated
 
+Outcome = Literal["measured", "lost", "too slow"]
+"""Of a run: at its end, without finite numbers, or beyond ``LONGEST`` (or bound to be, at the pace of a coarser step)."""
+
 
 @dataclass(frozen=True)
 class Point:
@@ -24,10 +27,11 @@ class Point:
 
     Attributes:
         engine, scheme, h, tolerance: which.
-        error: largest distance from the reference, in the problem's unit; infinite where the motion was lost.
+        error: largest distance from the reference, in the problem's unit; infinite unless it was measured.
         energy: largest change of energy less work done, J; None where it does not stay, or is not told.
         residual: how far what holds was off at most, m.
-        seconds: processor time per simulated second, the median; infinite where the motion was lost.
+        seconds: processor time per simulated second, the median; infinite unless it was measured.
+        outcome: what became of the run.
     """
 
     engine: str
@@ -38,16 +42,17 @@ class Point:
     energy: float | None
     residual: float | None
     seconds: float
+    outcome: Outcome = "measured"
 
     @property
-    def lost(self) -> bool:
-        """Whether the motion was."""
-        return math.isinf(self.error)
+    def measured(self) -> bool:
+        """Whether the run came to its end."""
+        return self.outcome == "measured"
 
     def figures(self) -> dict[str, Any]:
         """As plain data, with the simulated over the processor time; what is infinite is null."""
         figures = asdict(self) | {"real_time": 1.0 / self.seconds}
-        return figures | dict.fromkeys(("error", "seconds", "real_time")) if self.lost else figures
+        return figures if self.measured else figures | dict.fromkeys(("error", "seconds", "real_time"))
 
 
 def measure(
@@ -56,7 +61,7 @@ def measure(
     progress: Callable[[float], None] = lambda fraction: None,
     rounds: int = ROUNDS,
 ) -> list[Point]:
-    """Every scheme at all of its settings; those too slow are left out, as those finer than one too slow are."""
+    """Every scheme at all of its settings; those finer than one too slow are too slow, and not begun."""
     benchmark = problem.make()
     judge = Judge(problem, benchmark)
     duration = float(benchmark.times[-1])
@@ -68,17 +73,16 @@ def measure(
             if place and setting.tolerance is None:
                 expected *= scheme.settings[place - 1].h / setting.h
             if expected > LONGEST:
-                break
+                points[index, setting] = without(scheme, setting, "too slow")
+                continue
             try:
                 found = scheme.trajectory(benchmark, setting)
             except SimulationError:
-                points[index, setting] = judge.lost(scheme, setting)
+                points[index, setting] = without(scheme, setting, "lost")
                 continue
             expected = found.seconds
-            if found.q is None:
-                break
             points[index, setting] = judge.point(scheme, setting, found)
-            if not points[index, setting].lost:
+            if points[index, setting].measured:
                 times[index, setting] = []
         progress((index + 1) / len(schemes) * 0.5)
     # the runs above have warmed everything up; these are those that count
@@ -104,9 +108,10 @@ class Judge:
 
     def point(self, scheme: Scheme, setting: Setting, found: Trajectory) -> Point:
         """The figures of a trajectory, without its time."""
-        assert found.q is not None
+        if found.q is None:
+            return without(scheme, setting, "too slow")
         if not np.all(np.isfinite(found.q)):
-            return self.lost(scheme, setting)
+            return without(scheme, setting, "lost")
         error, energy, residual = 0.0, 0.0, 0.0
         tells_energy = found.v is not None and self._problem.conservative
         for k, value in enumerate(self._benchmark.values):
@@ -120,11 +125,12 @@ class Judge:
         told = energy if tells_energy else None
         return Point(scheme.engine, scheme.name, setting.h, setting.tolerance, error, told, own, math.inf)
 
-    def lost(self, scheme: Scheme, setting: Setting) -> Point:
-        """A setting at which the motion was lost."""
-        return Point(scheme.engine, scheme.name, setting.h, setting.tolerance, math.inf, None, None, math.inf)
-
     def _work(self) -> float:
         """Of the constant forces, J."""
         tau = self._benchmark.tau
         return 0.0 if tau is None else float(tau @ (self._run.q - self._benchmark.q))
+
+
+def without(scheme: Scheme, setting: Setting, outcome: Outcome) -> Point:
+    """A setting that has no figures, and why."""
+    return Point(scheme.engine, scheme.name, setting.h, setting.tolerance, math.inf, None, None, math.inf, outcome)

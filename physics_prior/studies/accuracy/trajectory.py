@@ -10,6 +10,7 @@ import numpy as np
 from physics_prior.studies.problems.mechanism import Benchmark
 
 LONGEST = 4.0  # s of processor time, beyond which a run is given up
+WATCHED = 0.02  # s of processor time, about which a run goes on unwatched
 
 
 @dataclass(frozen=True)
@@ -67,14 +68,23 @@ Advance = Callable[[float, int], None]
 def run_timed(
     benchmark: Benchmark, setting: Setting, advance: Advance, state: Callable[[], tuple[np.ndarray, np.ndarray]]
 ) -> Trajectory:
-    """Advance from time to time of the benchmark, by equal steps as near to h as divide the way; only that is timed."""
-    seconds, now, end = 0.0, 0.0, float(benchmark.times[-1])
+    """Advance from time to time of the benchmark, by equal steps as near to h as divide the way; only that is timed.
+
+    The steps are asked for in parts, doubled while they are brief, so that a run that is too slow ends between its steps.
+    """
+    seconds, now, end, part = 0.0, 0.0, float(benchmark.times[-1]), 1
     q, v = [], []
     for time in benchmark.times:
-        count = max(1, round((time - now) / setting.h))
-        begin = process_time()
-        advance((time - now) / count, count)
-        seconds += process_time() - begin
+        count = left = max(1, round((time - now) / setting.h))
+        while left > 0:
+            asked = min(part, left)
+            begin = process_time()
+            advance((time - now) / count, asked)
+            taken = process_time() - begin
+            seconds, left = seconds + taken, left - asked
+            if seconds > LONGEST:
+                return Trajectory(seconds, None, None)
+            part = 2 * part if taken < WATCHED else max(1, part // 2)
         now = float(time)
         own_q, own_v = state()
         q.append(own_q.copy())

@@ -13,6 +13,7 @@ from physics_prior.errors import PhysicsPriorError
 from physics_prior.studies.accuracy import measure as measuring
 from physics_prior.studies.accuracy import problem as problems
 from physics_prior.studies.accuracy import study, trajectory
+from physics_prior.studies.accuracy.card import unmeasured_table
 from physics_prior.studies.accuracy.compiled import Compiled
 from physics_prior.studies.accuracy.front import front, seconds_to_reach
 from physics_prior.studies.accuracy.measure import Point, measure
@@ -97,13 +98,50 @@ def test_springs_in_the_textbook_are_those_of_the_kernels():
 
 def test_a_motion_that_is_lost_is_told():
     (lost,) = measure(PROBLEMS["governor"], [Compiled("rk4", [Setting(0.01)], "rk4")], rounds=1)
-    assert lost.lost
+    assert lost.outcome == "lost"
     assert lost.figures()["error"] is None
 
 
-def test_what_takes_too_long_is_left_out(monkeypatch):
+def test_what_is_finer_than_what_is_too_slow_is_not_begun(monkeypatch):
     monkeypatch.setattr(measuring, "LONGEST", 1e-9)
-    assert len(measure(PROBLEMS["pendulum"], [Compiled("rk4", COARSE, "rk4")], rounds=1)) == 1
+    first, second = measure(PROBLEMS["pendulum"], [Compiled("rk4", COARSE, "rk4")], rounds=1)
+    assert (first.outcome, second.outcome) == ("measured", "too slow")
+    assert second.figures()["seconds"] is None
+    told = unmeasured_table({"problems": {"pendulum": {"title": "P", "points": [first.figures(), second.figures()]}}})
+    assert [*told.columns[-1].cells] == ["too slow at 25 ms"]
+
+
+def test_a_run_that_is_too_slow_ends_within_the_first_second(monkeypatch):
+    """Steps of 1 us of a motion first looked at after 1 s, by a clock that takes 1 ms a step: given up at 4 s."""
+    clock, asked = [0.0], []
+
+    def advance(h, count):
+        asked.append(count)
+        clock[0] += 1e-3 * count
+
+    monkeypatch.setattr(trajectory, "process_time", lambda: clock[0])
+    monkeypatch.setattr(trajectory, "LONGEST", 4.0)
+    benchmark = PROBLEMS["governor"].make()
+    assert benchmark.times[0] == 1.0
+    found = trajectory.run_timed(benchmark, Setting(1e-6), advance, lambda: (benchmark.q, benchmark.v))
+    assert found.q is None
+    assert 4.0 < found.seconds < 4.05  # it is looked at every 20 ms or so
+    assert asked[:4] == [1, 2, 4, 8]
+
+
+def test_parts_of_a_run_make_the_same_bits():
+    """A run that is watched, against one call from time to time."""
+    benchmark = short("double_pendulum").make()
+    found = Compiled("rk4", (), "rk4").trajectory(benchmark, Setting(1e-3))
+    simulator = benchmark.run().simulator
+    q, v, now = benchmark.q.copy(), benchmark.v.copy(), 0.0
+    simulator.begin(q, v)
+    for k, time in enumerate(benchmark.times):
+        count = round((time - now) / 1e-3)
+        simulator.advance(q, v, (time - now) / count, count)
+        now = time
+        assert np.array_equal(found.q[k], q)
+        assert np.array_equal(found.v[k], v)
 
 
 @pytest.mark.parametrize("module", ["mujoco", "pinocchio", "exudyn"])

@@ -22,6 +22,7 @@ COLORS = {
 PEERS = {"mujoco": "#7a1f1f", "pinocchio": "#3d3d8f", "exudyn": "#5b5b00"}
 MARKERS = "sD^v"
 TEXTBOOK = "#9a9a9a"
+NUMPY = "NumPy formulations"
 BEST, INK = "#cfe8dc", "#222222"
 FINEST, COARSEST = 1e-14, 3.0
 
@@ -50,10 +51,12 @@ def picture(problem: Problem, points: Sequence[Point]) -> Figure:
             color, marker = PEERS[own[0].engine], next(marks)
             axes.plot(x, y, ls="--", color=color, marker=marker, mfc="none", ms=6, lw=1.1, label=scheme, zorder=2)
     if any(point.engine == "textbook" for point in usable):
-        axes.plot([], [], ":", color=TEXTBOOK, lw=1.1, marker=".", ms=4, label="NumPy formulations")
+        axes.plot([], [], ":", color=TEXTBOOK, lw=1.1, marker=".", ms=4, label=NUMPY)
     edge = front([point for point in usable if point.engine == "compiled"])
     x, y = [point.error for point in edge], [point.seconds for point in edge]
     axes.plot(x, y, "-", color=BEST, lw=11, solid_capstyle="round", zorder=0, label="best of ours (Pareto front)")
+    for name in _absent(points):
+        axes.plot([], [], " ", label=f"{name}: lost or too slow")
     axes.axhline(1.0, color="#c0392b", lw=1.1, zorder=0.5)
     place = axes.get_yaxis_transform()
     label = axes.text(0.995, 1.0, "real time", color="#c0392b", fontsize=8, transform=place, ha="right", va="bottom")
@@ -71,6 +74,15 @@ def picture(problem: Problem, points: Sequence[Point]) -> Figure:
     axes.tick_params(labelsize=8.5)
     figure.legend(loc="outside right upper", fontsize=8, frameon=False, labelcolor=INK)
     return figure
+
+
+def _absent(points: Sequence[Point]) -> list[str]:
+    """Who has no figures at any setting, the NumPy formulations as one."""
+    measured: dict[str, bool] = {}
+    for point in points:
+        name = NUMPY if point.engine == "textbook" else point.scheme
+        measured[name] = measured.get(name, False) or point.measured
+    return [name for name, told in measured.items() if not told]
 
 
 def _duration(seconds: float, _: int) -> str:

@@ -15,6 +15,7 @@ from physics_prior.studies.accuracy import problem as problems
 from physics_prior.studies.accuracy import study, trajectory
 from physics_prior.studies.accuracy.card import unmeasured_table
 from physics_prior.studies.accuracy.compiled import Compiled
+from physics_prior.studies.accuracy.drawing import _absent
 from physics_prior.studies.accuracy.front import front, seconds_to_reach
 from physics_prior.studies.accuracy.measure import Point, measure
 from physics_prior.studies.accuracy.problem import PROBLEMS
@@ -107,6 +108,8 @@ def test_what_is_finer_than_what_is_too_slow_is_not_begun(monkeypatch):
     first, second = measure(PROBLEMS["pendulum"], [Compiled("rk4", COARSE, "rk4")], rounds=1)
     assert (first.outcome, second.outcome) == ("measured", "too slow")
     assert second.figures()["seconds"] is None
+    assert _absent([first, second]) == []
+    assert _absent([second]) == ["rk4"]
     told = unmeasured_table({"problems": {"pendulum": {"title": "P", "points": [first.figures(), second.figures()]}}})
     assert [*told.columns[-1].cells] == ["too slow at 25 ms"]
 

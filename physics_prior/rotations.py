@@ -193,7 +193,11 @@ def derivative(q: ArrayLike, omega_body: ArrayLike) -> Array:
 
 
 def _matrix(rows: list[list[Array]]) -> Array:
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    out = np.empty((*np.shape(rows[0][0]), len(rows), len(rows[0])))
+    for i, row in enumerate(rows):
+        for j, each in enumerate(row):
+            out[..., i, j] = each
+    return out
 
 
 def _angle_and_skew(rotation_vector: ArrayLike) -> tuple[Array, Array]:

@@ -71,6 +71,26 @@ def triangularise(T: Array, count: int, scratch: Array) -> None:
 
 
 @kernel
+def add_rows(shares: Array, F: Array, out: Array) -> None:
+    """Add the rows of F (n, m), each by its share (n,), to the first m numbers of out; zeros at both ends cost nothing."""
+    m, first, end = F.shape[1], 0, F.shape[0]
+    while first < end and shares[first] == 0.0:
+        first += 1
+    while end > first and shares[end - 1] == 0.0:
+        end -= 1
+    whole = end - (end - first) % 4
+    for k in range(first, whole, 4):
+        p, q, r, s = shares[k], shares[k + 1], shares[k + 2], shares[k + 3]
+        x, y, z, t = F[k], F[k + 1], F[k + 2], F[k + 3]
+        for j in range(m):
+            out[j] += p * x[j] + q * y[j] + r * z[j] + s * t[j]
+    for k in range(whole, end):
+        p, x = shares[k], F[k]
+        for j in range(m):
+            out[j] += p * x[j]
+
+
+@kernel
 def carry_factor(F: Array, G: Array, U: Array, T: Array) -> None:
     """Fill T (n + g, n) with U F^T above G^T: T^T T is the predicted covariance F U^T U F^T + G G^T.
 
@@ -81,24 +101,10 @@ def carry_factor(F: Array, G: Array, U: Array, T: Array) -> None:
         for j in range(i):
             F[i, j], F[j, i] = F[j, i], F[i, j]
     for i in range(n):
-        row, own = T[i], U[i]
+        row = T[i]
         for j in range(n):
             row[j] = 0.0
-        first, end = 0, n
-        while first < end and own[first] == 0.0:
-            first += 1
-        while end > first and own[end - 1] == 0.0:
-            end -= 1
-        whole = end - (end - first) % 4
-        for k in range(first, whole, 4):
-            p, q, r, s = own[k], own[k + 1], own[k + 2], own[k + 3]
-            x, y, z, t = F[k], F[k + 1], F[k + 2], F[k + 3]
-            for j in range(n):
-                row[j] += p * x[j] + q * y[j] + r * z[j] + s * t[j]
-        for k in range(whole, end):
-            p, x = own[k], F[k]
-            for j in range(n):
-                row[j] += p * x[j]
+        add_rows(U[i], F, row)
     for i in range(g):
         row = T[n + i]
         for j in range(n):

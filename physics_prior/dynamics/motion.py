@@ -28,6 +28,7 @@ from physics_prior.dynamics.manifold import displace
 from physics_prior.dynamics.mass_factor import factorize_mass, solve_mass
 from physics_prior.dynamics.memory import OPEN, SPARE, TIME, correction_sections, sections, tangent_sections
 from physics_prior.dynamics.projection import project
+from physics_prior.dynamics.reactions import tell_wrenches
 from physics_prior.dynamics.types import Array
 from physics_prior.effects.none import differentiate_forces, forces, potential_energy  # scene: effects
 
@@ -252,3 +253,50 @@ def spread_noise(memory: Array, tangent: Array, force_noise: Array, h: float, G:
             G[nv + k, nv + j] = late * columns[k, j]
     if CONSTRAINED:
         project_columns(memory, matrices[nv : nv + m], matrices[nv + m : nv + 2 * m], G, scratch, False)
+
+
+@kernel
+def spread_wrenches(
+    memory: Array,
+    q: Array,
+    v: Array,
+    errors: Array,
+    share: float,
+    places: Array,
+    firsts: Array,
+    pair: Array,
+    total: Array,
+    scratch: Array,
+) -> None:
+    """Add to total (., 6) the squares of what errors (k, n) of a state do to its wrenches: differences, a share to either side.
+
+    n: the tangent of q, v, and the nf parameters at places. pair (2, ., 6) is scratch, its wrenches those of ``tell_wrenches``,
+    and scratch (4 nv + nf + nq,), zero at the beginning.
+    """
+    links, work, pairs, _, _, _, _, parameters = sections(memory)
+    nv, nf = v.shape[0], places.shape[0]
+    delta, rate, still, vdot = scratch[:nv], scratch[nv : 2 * nv], scratch[2 * nv : 3 * nv], scratch[3 * nv : 4 * nv]
+    force, moved = scratch[4 * nv : 4 * nv + nf], scratch[4 * nv + nf :]
+    for j in range(nf):
+        force[j] = parameters[places[j]]
+    for k in range(errors.shape[0]):
+        own, any_error = errors[k], False
+        for j in range(own.shape[0]):
+            any_error = any_error or own[j] != 0.0
+        if not any_error:
+            continue
+        for side in range(2):
+            s = share if side == 0 else -share
+            for j in range(nv):
+                delta[j], rate[j] = s * own[j], v[j] + s * own[nv + j]
+            displace(links, q, delta, moved)
+            for j in range(nf):
+                parameters[places[j]] = force[j] + s * own[2 * nv + j]
+            evaluate(memory, moved, rate, still, 0.0, vdot)
+            tell_wrenches(links, work, pairs, firsts, pair[side])
+        for row in range(pair.shape[1]):
+            for e in range(6):
+                slope = (pair[0, row, e] - pair[1, row, e]) / (2.0 * share)
+                total[row, e] += slope * slope
+    for j in range(nf):
+        parameters[places[j]] = force[j]

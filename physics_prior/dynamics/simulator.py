@@ -18,6 +18,7 @@ from physics_prior.dynamics.failure import failure, require_finite
 from physics_prior.dynamics.inertia_check import check_inertia
 from physics_prior.dynamics.integrators import DEFAULT, INTEGRATORS, TOLERATED, IntegratorName
 from physics_prior.dynamics.memory import SPARE, TIME, TOLERANCE, Memory, correction_size, tangent_size
+from physics_prior.dynamics.reactions import tell_wrenches
 from physics_prior.dynamics.records import link_records, motion_tables, moved_freedoms, pair_records
 from physics_prior.dynamics.switches import Switches
 from physics_prior.dynamics.unknown_forces import UnknownForces
@@ -37,7 +38,7 @@ class Simulator:
 
     Attributes:
         tree, effects, integrator: what it was built from.
-        nq, nv, rows: sizes of configuration, velocity and constraint rows.
+        nq, nv, rows: sizes of configuration, velocity and constraint rows; firsts: where each constraint effect's pairs begin.
         wrench_names: whose wrenches there are: moving joints, then effects that hold something, what touches, and feet.
         touching: contacts and limits, each with the indices of its records in ``candidates``.
         unknown: the unknown forces and the values that they have now (unknown_forces.py).
@@ -65,12 +66,12 @@ class Simulator:
         for effect in effects:
             effect.check(tree)
         self.tree, self.effects, self.integrator = tree, tuple(effects), integrator
-        self._labels: list[tuple[str, int, int]] = []
+        labels: list[tuple[str, int, int]] = []
         pairs: list[PointPair] = []
         for effect in effects:
             own = effect.point_pairs(tree)
             if own:
-                self._labels.append((effect.label, len(pairs), len(pairs) + len(own)))
+                labels.append((effect.label, len(pairs), len(pairs) + len(own)))
                 pairs.extend(own)
         touching = [pair for effect in effects for pair in effect.touching_pairs(tree)]
         ranges = [each for effect in effects for each in effect.joint_ranges(tree)]
@@ -80,6 +81,7 @@ class Simulator:
         self.touching = candidates_by_name(tree, effects)
         self.interval, self.rank = interval, 0
         self.nq, self.nv = tree.nq, tree.nv
+        self.firsts = np.array([*(first for _, first, _ in labels), len(pairs)])
         self.rows = sum(1 if pair.length is not None else len(pair.directions) for pair in pairs)
         records, parameters = pair_records(tree, pairs), pack_parameters(tree, effects)
         tables = motion_tables(tree, pairs, records, len(parameters))
@@ -102,7 +104,7 @@ class Simulator:
         self.memory, self.unknown = memory, UnknownForces(tree, effects, memory.parameters)
         self.wrench_names = [
             *(link.joint.name for link in tree.links),
-            *(label for label, _, _ in self._labels),
+            *(label for label, _, _ in labels),
             *self.touching,
             *(foot.name for foot in self.unknown.feet),
         ]
@@ -116,7 +118,7 @@ class Simulator:
         self._tangent = np.zeros(0)
         self._stores = any(effect.compiled is not None and effect.compiled.energy is not None for effect in effects)
         self._posed = np.zeros(self.nq)
-        self.switches = Switches(self, {label: (first, last) for label, first, last in self._labels})
+        self.switches = Switches(self, {label: (first, last) for label, first, last in labels})
         check_inertia(self)
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray | None = None) -> np.ndarray:
@@ -305,17 +307,10 @@ class Simulator:
         """
         out = np.zeros((len(self.wrench_names), 6))
         self._posed[:] = q
-        count = len(self._links)
         if vdot is None:
             self._evaluate(q, v, self._still, self._vdot)
-            if self.rows:
-                constraint.load_links(self._work, self._pairs)
-            for row, (_, first, last) in enumerate(self._labels, start=count):
-                own = self._pairs[first:last]
-                out[row, :3] = own["force"].sum(axis=0)
-                if last - first > 1:
-                    out[row, 3:] = np.cross(own["b"] - own["b"][0], own["force"]).sum(axis=0)
-            for row, indices in enumerate(self.touching.values(), start=count + len(self._labels)):
+            tell_wrenches(self._links, self._work, self._pairs, self.firsts, out)
+            for row, indices in enumerate(self.touching.values(), start=len(self._links) + len(self.firsts) - 1):
                 push = reaction(self.tree, self._work, self.candidates[indices])
                 out[row, :3], out[row, 3:] = push.force, push.moment
             out[len(out) - len(self.unknown.feet) :] = self.unknown.wrench_rows()
@@ -323,9 +318,7 @@ class Simulator:
             self.candidates[["force", "moment", "point"]] = 0.0
             kinematics.move(self._links, self._work, q, v)
             newton_euler.spread(self._links, self._work, vdot, self._gravity)
-        newton_euler.transmit(self._links, self._work)
-        out[:count, :3] = self._work["bias_force"]
-        out[:count, 3:] = self._work["bias_moment"]
+            tell_wrenches(self._links, self._work, self._pairs[:0], self.firsts[:1], out)
         return out
 
     def wrenches(self, q: np.ndarray, v: np.ndarray, vdot: np.ndarray | None = None) -> dict[str, Wrench]:
@@ -334,7 +327,7 @@ class Simulator:
         place(self._work, self._pairs)
         points = [
             *self._work["origin"],
-            *(self._pairs["b"][first] for _, first, _ in self._labels),
+            *self._pairs["b"][self.firsts[:-1]],
             *(reaction(self.tree, self._work, self.candidates[each]).point for each in self.touching.values()),
             *self.unknown.points(self),
         ]

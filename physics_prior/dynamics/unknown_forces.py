@@ -28,7 +28,7 @@ class UnknownForces:
     """The unknown forces f (count,) of a simulator, effect by effect; ``parameters`` are the numbers of its step.
 
     Attributes:
-        deviation, time_constant: (count,) of each.
+        deviation, time_constant: (count,) of each; places: (count,) where in the parameters it is.
         feet: the soles, whose six forces each are a wrench, force first, world axes.
         torques, freedoms: which forces act in joints, and on which degrees of freedom.
 
@@ -54,7 +54,7 @@ class UnknownForces:
             if force.sole is not None:
                 self.feet.append(Foot(effect.label, force.sole, slice(self.count, self.count + size)))
             self.count += size
-        self._places = np.concatenate(places)
+        self.places = np.concatenate(places)
         self.deviation, self.time_constant = np.concatenate(deviation), np.concatenate(constants)
         of_all = np.concatenate([np.zeros(0, dtype=int), *freedoms])
         self.torques = np.flatnonzero(of_all >= 0)
@@ -63,11 +63,11 @@ class UnknownForces:
     @property
     def force(self) -> np.ndarray:
         """(count,) the forces that act now, N or N m; settable."""
-        return np.take(self._parameters, self._places)
+        return np.take(self._parameters, self.places)
 
     @force.setter
     def force(self, value: np.ndarray) -> None:
-        self._parameters[self._places] = value
+        self._parameters[self.places] = value
 
     def columns(self, simulator: "Simulator") -> np.ndarray:
         """D (nv, count): generalized forces by f; needs ``simulator.move``."""
@@ -80,7 +80,8 @@ class UnknownForces:
 
     def wrench_rows(self) -> np.ndarray:
         """(feet, 6) the wrenches that act now."""
-        return np.array([self.force[foot.span] for foot in self.feet]).reshape(-1, 6)
+        force = self.force
+        return np.array([force[foot.span] for foot in self.feet]).reshape(-1, 6)
 
     def points(self, simulator: "Simulator") -> list[np.ndarray]:
         """Where these act, (3,) m in the world; needs the poses."""

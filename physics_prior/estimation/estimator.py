@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from physics_prior.dynamics.wrench_deviations import wrench_deviations
 from physics_prior.errors import MeasurementError, SimulationError
 from physics_prior.estimation.estimate import Counts, Estimate, Health, Level
 from physics_prior.estimation.filter import Filter, Posterior
@@ -13,6 +14,7 @@ from physics_prior.estimation.history import START_WINDOW, History, Node
 from physics_prior.estimation.measurement import Measurement, SwitchCommand, command_topic
 from physics_prior.estimation.processes import PROCESSES
 from physics_prior.estimation.readout import force_errors
+from physics_prior.estimation.square_root import covariance_of
 from physics_prior.estimation.start import start
 from physics_prior.estimation.switching import active_at_start
 from physics_prior.scene import Scene
@@ -129,12 +131,11 @@ class Estimator:
         rank = simulator.rank
         deviations = self._wrench_deviations(posterior)
         error = simulator.constraint_error(state.q, state.v)
-        covariance = posterior.factor @ posterior.factor.T
         return Estimate(
             stamp=posterior.stamp,
             q=state.q.copy(),
             v=state.v.copy(),
-            covariance=covariance[: 2 * nv, : 2 * nv],
+            covariance=covariance_of(posterior.factor[: 2 * nv]),
             vdot=vdot.copy(),
             effort=effort,
             wrenches=wrenches,
@@ -154,6 +155,8 @@ class Estimator:
         contact are given that what touches goes on touching.
         """
         process, simulator, here = self.filter.process, self.simulator, posterior.state
+        if not (simulator.touching or len(here.acceleration)):
+            return wrench_deviations(simulator, here.q, here.v, posterior.factor, DIFFERENCE)
         total = np.zeros((len(simulator.wrench_names), 6))
         for column in force_errors(simulator, posterior).T:
             if not column.any():

@@ -145,14 +145,14 @@ class Filter:
         seen = self.innovation(measurement, prior.state)
         if len(seen.y) == 0:
             return self._fresh(prior)
+        U = np.ascontiguousarray(prior.factor.T)
         many, doubtful, partly = gated and len(seen.y) > seen.block, False, False
         if many:
-            believed = seen.squares(prior.factor) <= self.gate_limit(seen.block)
+            believed = seen.squares(U) <= self.gate_limit(seen.block)
             doubtful = float(np.mean(believed)) < QUORUM
             partly = not (doubtful or believed.all())
             if partly:
                 seen = seen.kept(believed)
-        U = np.ascontiguousarray(prior.factor.T)
         gain = gain_of(U, seen)
         if doubtful or (gated and not many and not gain.nis <= self.gate_limit(len(seen.y))):
             return replace(

@@ -11,11 +11,30 @@ accelerations of the joints as they are, so that a surprise under the foot moves
 
 import numpy as np
 
+from physics_prior.dynamics.arrays import add_product
 from physics_prior.dynamics.compose import GRAVITY
+from physics_prior.dynamics.covariance import add_rows
+from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.simulator import Simulator
+from physics_prior.dynamics.types import Array
 from physics_prior.estimation import ground
 from physics_prior.estimation.process import OnManifold, State, WhiteForces
 from physics_prior.scene import Scene
+
+
+@kernel
+def carry_forced(F: Array, by_force: Array, forgotten: Array, U: Array, out: Array) -> None:
+    """Fill the first n rows of out (., n) with a factor U (n, n) carried; P = U^T U, everything transposed.
+
+    F (2 nv, 2 nv) and by_force (nf, 2 nv): derivatives of (q, v); forgotten (nf,): that of each force by itself.
+    """
+    n, m = U.shape[0], F.shape[0]
+    for i in range(n):
+        row, own = out[i], U[i]
+        add_rows(own[:m], F, row)
+        add_rows(own[m:], by_force, row)
+        for j in range(m, n):
+            row[j] = forgotten[j - m] * own[j]
 
 
 class ForcedProcess(OnManifold):
@@ -45,25 +64,29 @@ class ForcedProcess(OnManifold):
         return np.where(self._acting(state), self.unknown.deviation, 0.0)
 
     def advance(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
-        nv, nf = self.nv, self.unknown.count
+        W = self.carry(state, np.eye(self.n), h)
+        return W[:, : self.n], W[:, self.n :]
+
+    def carry(self, state: State, factor: np.ndarray, h: float) -> np.ndarray:
+        nv, nf, n = self.nv, self.unknown.count, self.n
         self.enter(state)
         M = self.simulator.mass_matrix(state.q)
         D = self.unknown.columns(self.simulator)
-        response = np.linalg.solve(M, D)
+        response = np.linalg.solve(M, D).T
         forgotten = np.exp(-h / self.unknown.time_constant)
-        F = np.zeros((self.n, self.n))
         noise = self._force_noise(state, M, D, h)
-        F[: 2 * nv, : 2 * nv], white = self.simulator.linearise(state.q, state.v, h, self._white.factor(state))
-        F[: 2 * nv, 2 * nv :] = 0.5 * h * F[: 2 * nv, nv : 2 * nv] @ response
-        F[nv : 2 * nv, 2 * nv :] += 0.5 * h * response
-        F[2 * nv :, 2 * nv :] = np.diag(forgotten)
+        F, G = (each.T for each in self.simulator.linearise(state.q, state.v, h, self._white.factor(state)))
+        by_force = np.zeros((nf, 2 * nv))
+        add_product(response, F[nv:], by_force)
+        by_force[:, nv:] += response
         mean = self._mean(state)
         state.force = mean + forgotten * (state.force - mean)
-        columns = white.shape[1] if self._white.any else 0
-        G = np.zeros((self.n, columns + nf))
-        G[: 2 * nv, :columns] = white[:, :columns]
-        G[2 * nv :, columns:] = noise
-        return F, G
+        columns = 2 * nv if self._white.any else 0
+        W = np.zeros((n + columns + nf, n))
+        carry_forced(F, 0.5 * h * by_force, forgotten, np.ascontiguousarray(factor.T), W)
+        W[n : n + columns, : 2 * nv] = G[:columns]
+        W[n + columns :, 2 * nv :] = noise.T
+        return W.T
 
     def predict(self, state: State, factor: np.ndarray, h: float, count: int) -> np.ndarray:
         factor = super().predict(state, factor, h, count)

@@ -34,7 +34,7 @@ def gain_of(U: np.ndarray, seen: Innovation) -> Gain:
     """
     H, noise, y, rest, log_noise = seen.H, seen.noise, seen.y, 0.0, 0.0
     if len(y) >= MANY and len(y) > H.shape[1]:
-        H, y, rest = compressed(*seen.whitened())
+        H, y, rest = compressed(*seen.whitened)
         noise, log_noise = np.eye(len(y)), 2.0 * float(np.sum(np.log(np.diag(seen.noise))))
     m, n = len(y), len(U)
     T, scratch, correction = np.empty((m + n, m + n)), np.empty(2 * (m + n)), np.empty(n)

@@ -124,16 +124,17 @@ def admit(process: "ForcedProcess", state: State, factor: np.ndarray) -> bool:
             if not grounded:
                 continue
             own = slice(2 * nv + foot.span.start, 2 * nv + foot.span.stop)
+            rows = bounds(simulator, foot, state.force[foot.span])
             for index in range(6):
-                row = bounds(simulator, foot, state.force[foot.span])[index]
-                excess = -float(row @ state.force[foot.span])
-                spread = row @ factor[own]
+                excess = -float(rows[index] @ state.force[foot.span])
+                spread = rows[index] @ factor[own]
                 if excess <= 1e-9 * process.scale or not spread.any():
                     continue
                 kept, moved = False, True
                 there = process.displace(state, factor @ spread * (excess / float(spread @ spread)))
                 state.q[:], state.v[:], state.force[:] = there.q, there.v, there.force
                 simulator.move(state.q, state.v)
+                rows = bounds(simulator, foot, state.force[foot.span])
         if kept:
             break
     for foot, grounded in zip(process.unknown.feet, state.grounded, strict=True):

@@ -1,7 +1,7 @@
 """Observation models: what a state lets a source see, how that depends on the state, and how noisy it is."""
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from physics_prior.estimation.measurement import (
     PointsMeasurement,
     PoseMeasurement,
 )
+from physics_prior.estimation.square_root import block_squares, whiten
 from physics_prior.model import JointKind
 from physics_prior.scene import (
     JointSource,
@@ -64,27 +65,19 @@ class Innovation:
         rows = np.repeat(blocks, self.block)
         return Innovation(self.y[rows], self.H[rows], self.noise[np.ix_(rows, rows)], self.block)
 
+    @cached_property
     def whitened(self) -> tuple[np.ndarray, np.ndarray]:
         """H and y in standard deviations of the noise, and independent of each other."""
-        own = self._own_noise()
-        H = np.linalg.solve(own, self.H.reshape(len(own), self.block, -1))
-        return H.reshape(self.H.shape), np.linalg.solve(own, self.y.reshape(-1, self.block, 1)).ravel()
+        H, y = self.H.copy(), self.y.copy()
+        whiten(self.noise, self.block, H, y)
+        return H, y
 
-    def squares(self, S: np.ndarray) -> np.ndarray:
-        """(m / block,) normalised innovation squared of each block alone; S (n, n) factor of the state's covariance.
-
-        In units of the noise 1 + s s^T, of which s is whitened: its eigenvalues are 1 and more, however little is known.
-        """
-        H, y = self.whitened()
-        spread = (H @ S[: H.shape[1]]).reshape(-1, self.block, S.shape[1])
-        sizes, axes = np.linalg.eigh(spread @ spread.transpose(0, 2, 1))
-        along = (axes.transpose(0, 2, 1) @ y.reshape(-1, self.block, 1))[:, :, 0]
-        return np.asarray(np.sum(along**2 / (1.0 + np.maximum(sizes, 0.0)), axis=1))
-
-    def _own_noise(self) -> np.ndarray:
-        """(m / block, block, block) factors of the noise of each block."""
-        each = np.arange(len(self.y) // self.block)
-        return self.noise.reshape(len(each), self.block, len(each), self.block)[each, :, each, :]
+    def squares(self, U: np.ndarray) -> np.ndarray:
+        """(m / block,) normalised innovation squared of each block alone; the state's covariance is U^T U, U (n, n)."""
+        out, n = np.empty(len(self.y) // self.block), len(U)
+        T, scratch = np.empty((self.block + n, self.block)), np.empty(n + 2 * self.block)
+        block_squares(*self.whitened, U, self.block, T, scratch, out)
+        return out
 
 
 FITS = {

@@ -7,11 +7,19 @@ import math
 
 import numpy as np
 
+from physics_prior.dynamics.arrays import add_product
 from physics_prior.dynamics.covariance import triangularise
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.types import Array
 
 ROUNDING = 1e-10  # of the largest standard deviation: below it, another is that of a direction that constraints forbid
+
+
+def covariance_of(S: np.ndarray) -> np.ndarray:
+    """(k, k) S S^T of rows S (k, n) of a factor, symmetric to the last bit; summed alike on any number of cores."""
+    out = np.zeros((len(S), len(S)))
+    add_product(np.ascontiguousarray(S), np.ascontiguousarray(S.T), out)
+    return 0.5 * (out + out.T)
 
 
 def lower_factor(W: np.ndarray) -> np.ndarray:
@@ -68,6 +76,56 @@ def innovate(
     for j in range(h):
         largest = max(largest, abs(correction[j]))
     return nis, determinant, largest
+
+
+@kernel
+def whiten(noise: Array, block: int, H: Array, y: Array) -> None:
+    """Bring H (m, h) and y (m,) in place to standard deviations of the noise (m, m), a lower factor of blocks on its diagonal."""
+    for i in range(y.shape[0]):
+        scale = 1.0 / noise[i, i]
+        for k in range(i - i % block, i):
+            share = noise[i, k]
+            if share != 0.0:
+                y[i] -= share * y[k]
+                for j in range(H.shape[1]):
+                    H[i, j] -= share * H[k, j]
+        y[i] *= scale
+        for j in range(H.shape[1]):
+            H[i, j] *= scale
+
+
+@kernel
+def block_squares(H: Array, y: Array, U: Array, block: int, T: Array, scratch: Array, out: Array) -> None:
+    """Fill out (k,) with the normalised innovation squared of each block of an innovation alone, H (k block, h), y (k block,).
+
+    Both are whitened: a block's covariance is 1 + s^T s with s = U H^T, of which reflections turn T (block + n, block) into a
+    factor, whose diagonal is 1 and more, however little is known. scratch (n + 2 block,).
+    """
+    n, h = U.shape[0], H.shape[1]
+    for index in range(out.shape[0]):
+        first = block * index
+        for i in range(block):
+            for j in range(block):
+                T[i, j] = 1.0 if i == j else 0.0
+        for k in range(n):
+            row, own = T[block + k], U[k]
+            begin = 0
+            while begin < h and own[begin] == 0.0:
+                begin += 1
+            for i in range(block):
+                total, seen = 0.0, H[first + i]
+                for j in range(begin, h):
+                    total += own[j] * seen[j]
+                row[i] = total
+        triangularise(T, block, scratch)
+        out[index] = 0.0
+        for i in range(block):
+            white = y[first + i]
+            for j in range(i):
+                white -= T[j, i] * scratch[j]
+            white /= T[i, i]
+            scratch[i] = white
+            out[index] += white * white
 
 
 def compressed(H: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

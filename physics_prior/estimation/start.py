@@ -185,7 +185,7 @@ def _count(measurement: Measurement) -> int:
 def _excess(filter: Filter, measurement: Measurement, state: State) -> np.ndarray:
     """How far each seen marker, or all that was measured, is from where the state has it: squared, over what the gate allows."""
     seen = filter.innovation(measurement, state)
-    _, y = seen.whitened()
+    _, y = seen.whitened
     return np.asarray(np.sum(y.reshape(-1, seen.block) ** 2, axis=1) / filter.gate_limit(seen.block))
 
 
@@ -209,7 +209,7 @@ def _gauss_newton(
         rows, errors = [np.zeros((0, simulator.nv))], [np.zeros(0)]
         for measurement in measurements:
             seen = filter.innovation(measurement, state)
-            own_rows, own_errors = seen.whitened()
+            own_rows, own_errors = seen.whitened
             rows.append(own_rows)
             errors.append(own_errors)
         H, y = np.concatenate(rows), np.concatenate(errors)

@@ -1,11 +1,16 @@
 """Unknown forces as states: their noise, what they do to a state, consistency, feet that stand and lift, and standing still."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
 from scipy.stats import chi2
 
 from physics_prior import rotations
+from physics_prior.dynamics.wrench_deviations import wrench_deviations
 from physics_prior.errors import SceneError
 from physics_prior.estimation import ground
 from physics_prior.estimation.estimator import Estimator
@@ -146,6 +151,24 @@ def test_a_surprise_under_a_foot_moves_no_joint(process, standing):
         assert np.max(np.abs(accelerations[6:])) < 1e-9 * np.max(np.abs(accelerations[:6]))
     torques = noise[np.ix_(process.unknown.torques, process.unknown.torques)]
     assert np.count_nonzero(torques - np.diag(np.diag(torques))) == 0
+
+
+def test_deviations_of_forces_are_those_of_differences(process, standing):
+    """Against differences in Python, a column at a time; those of feet are of states: exact."""
+    state, factor, simulator = moved(process, standing, 4), 1e-2 * _noisy(process, 4), process.simulator
+    process.enter(state)
+    ours, squares = wrench_deviations(simulator, state.q, state.v, factor, 1e-3), 0.0
+    np.testing.assert_array_equal(process.unknown.force, state.force)
+    for column in factor.T:
+        pair = []
+        for sign in (1e-3, -1e-3):
+            near = process.displace(state, sign * column)
+            process.enter(near)
+            pair.append(simulator.wrench_array(near.q, near.v))
+        squares = squares + ((pair[0] - pair[1]) / 2e-3) ** 2
+    np.testing.assert_allclose(ours, np.sqrt(squares), rtol=1e-8, atol=1e-9 * np.max(ours))  # 2e-11
+    for row, foot in enumerate(process.unknown.feet, start=len(ours) - 2):
+        np.testing.assert_allclose(ours[row], np.linalg.norm(factor[2 * process.nv :][foot.span], axis=1), rtol=1e-14)
 
 
 def _noisy(process, seed):
@@ -349,3 +372,36 @@ def test_who_stands_still_is_borne_by_the_ground(scene, process, standing):
     low, high = np.min(np.concatenate(corners), axis=0), np.max(np.concatenate(corners), axis=0)
     assert (low[:2] < np.min(pressures, axis=0)).all()
     assert (np.max(pressures, axis=0) < high[:2]).all()
+
+
+ONE_RUN = """
+import hashlib
+import numpy as np
+from physics_prior.estimation.estimator import Estimator
+from physics_prior.estimation.measurement import PointsMeasurement
+from physics_prior.scene import load_scene
+
+scene = load_scene("walk_lemouel")
+(source,), estimator, rng = scene.measurements, Estimator(scene), np.random.default_rng(0)
+estimator.simulator.move(scene.initial.q, scene.initial.v)
+poses = [estimator.simulator.pose(marker.part) for marker in source.markers]
+places = [position + R @ marker.point for (position, R), marker in zip(poses, source.markers, strict=True)]
+for stamp in range(0, 60_000_000, 5_000_000):
+    points = np.array(places) + 1e-3 * rng.normal(size=(len(places), 3))
+    estimator.add(PointsMeasurement(stamp, source.topic, points))
+estimate = estimator.estimate()
+numbers = [estimate.q, estimate.v, estimate.covariance, *estimate.wrench_deviations.values()]
+print(hashlib.sha256(b"".join(array.tobytes() for array in numbers)).hexdigest())
+"""
+
+
+def test_the_same_numbers_on_any_number_of_cores():
+    """Libraries of linear algebra share large products among cores, and round otherwise then: those of 126 errors were."""
+    said = set()
+    for count in ("1", "2"):
+        environment = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), count)
+        run = subprocess.run(
+            [sys.executable, "-c", ONE_RUN], env=os.environ | environment, capture_output=True, text=True, check=True
+        )
+        said.add(run.stdout)
+    assert len(said) == 1

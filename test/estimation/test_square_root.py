@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from physics_prior.dynamics.covariance import carry_factor, triangularise
+from physics_prior.estimation.observation import Innovation
 from physics_prior.estimation.square_root import innovate, lower_factor, normalised_error
 
 seeds = st.integers(0, 2**32 - 1)
@@ -82,6 +83,37 @@ def test_update_is_the_dense_one(seed, n, m, unseen):
     np.testing.assert_allclose(correction, K @ y, rtol=0, atol=1e-13 * conditioning * np.linalg.norm(K @ y))
     assert _relative(posterior @ posterior.T - joseph, P) < 1e-13 * conditioning
     assert determinant == pytest.approx(np.linalg.slogdet(innovation)[1], rel=1e-9, abs=1e-9)
+
+
+def _frame(rng, n, blocks):
+    """An innovation of blocks of three rows, each with its own noise."""
+    noise = np.zeros((3 * blocks, 3 * blocks))
+    for k in range(0, 3 * blocks, 3):
+        noise[k : k + 3, k : k + 3] = _factor(rng, 3, 0) + np.eye(3)
+    return Innovation(rng.normal(size=3 * blocks), rng.normal(size=(3 * blocks, n - 1)), noise, 3)
+
+
+@given(seeds, st.integers(2, 8), st.integers(1, 5))
+def test_blocks_are_whitened_and_judged_alone(seed, n, blocks):
+    rng = np.random.default_rng(seed)
+    seen, S = _frame(rng, n, blocks), _factor(rng, n, 0)
+    H, y = seen.whitened
+    np.testing.assert_allclose(seen.noise @ H, seen.H, atol=1e-12)
+    np.testing.assert_allclose(seen.noise @ y, seen.y, atol=1e-12)
+    squares = seen.squares(np.ascontiguousarray(S.T))
+    for k, square in enumerate(squares):
+        rows = slice(3 * k, 3 * k + 3)
+        spread = seen.H[rows] @ S[: n - 1]
+        P = spread @ spread.T + seen.noise[rows, rows] @ seen.noise[rows, rows].T
+        assert square == pytest.approx(seen.y[rows] @ np.linalg.solve(P, seen.y[rows]), rel=1e-13 * np.linalg.cond(P))
+
+
+@given(seeds)
+def test_blocks_are_judged_however_little_is_known(seed):
+    """Standard deviations of 1e12: what is measured says nothing against the state."""
+    rng = np.random.default_rng(seed)
+    squares = _frame(rng, 6, 4).squares(1e12 * _factor(rng, 6, 0).T)
+    assert np.all((squares >= 0.0) & (squares < 1e-6))
 
 
 @settings(max_examples=20)

@@ -36,9 +36,10 @@ from physics_prior.estimation.lagged import Lagged
 from physics_prior.interface import Output, take_in
 from physics_prior.interface.output import Publication
 from physics_prior.interface.pace import Pace
-from physics_prior.interface.topics import MARKERS, TRANSFORMS, switch_services
+from physics_prior.interface.topics import TRANSFORMS, switch_services
 from physics_prior.interface.warm_up import warm_up
 from physics_prior.recording.cdr import encode
+from physics_prior.recording.messages import MarkerArray
 from physics_prior.ros_inputs import Input, ros_class
 from physics_prior.ros_parameters import AUTOSTART, declare, require_scene, why_refused
 from physics_prior.scene import MeasurementSource, load_scene
@@ -154,8 +155,9 @@ class PhysicsPriorNode(LifecycleNode):
                 self.get_logger().info(f"{topic} is not published: it needs the package tf2_msgs")
                 continue
             # markers are latched: a viewer that comes late sees the model at once
-            durability = DurabilityPolicy.TRANSIENT_LOCAL if topic == MARKERS else DurabilityPolicy.VOLATILE
-            depth = 1 if topic == MARKERS else OUTPUT_QUEUE
+            latched = message_type is MarkerArray
+            durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+            depth = 1 if latched else OUTPUT_QUEUE
             self._publishers_by_topic[topic] = self.create_lifecycle_publisher(
                 ros_class(message_type.ros_type), topic, QoSProfile(depth=depth, durability=durability)
             )

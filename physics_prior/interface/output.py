@@ -25,6 +25,7 @@ from physics_prior.interface.topics import (
     deviation_topic,
     force_topics,
     free_links,
+    published_names,
     scalar_links,
     topics_of,
     vector_links,
@@ -52,6 +53,7 @@ class Output:
         self._scalars, self._vectors = scalar_links(scene.tree), vector_links(scene.tree)
         self._free, self._balls = free_links(scene.tree), ball_links(scene.tree)
         self._forces = force_topics(scene)
+        self._published = published_names(scene)
         self._names = scene.tree.freedom_names
 
     def states(self, estimate: Estimate) -> list[Publication]:
@@ -82,13 +84,13 @@ class Output:
             wrench, deviation = estimate.wrenches[name], estimate.wrench_deviations[name]
             out.append((topic, WrenchStamped(header, wrench_of(wrench.force, wrench.moment))))
             out.append((deviation_topic(topic), WrenchStamped(header, wrench_of(deviation[:3], deviation[3:]))))
-        return out
+        return self._named(out)
 
     def markers(self, estimate: Estimate) -> list[Publication]:
         """What to draw. Raises SimulationError as ``states`` does."""
         _require_finite(estimate)
         header = self._header(estimate.stamp)
-        return [(MARKERS, markers.markers(header, list(self._forces), estimate, self._simulator))]
+        return self._named([(MARKERS, markers.markers(header, list(self._forces), estimate, self._simulator))])
 
     def diagnostics(
         self,
@@ -108,6 +110,9 @@ class Output:
     def active_effects(self, estimate: Estimate) -> list[str]:
         """The names of the effects that act in an estimate, as its diagnostics tell them."""
         return diagnostics.active_effects(self._scene, self._simulator, estimate)
+
+    def _named(self, publications: list[Publication]) -> list[Publication]:
+        return [(self._published[topic], message) for topic, message in publications]
 
     def _header(self, stamp: int) -> Header:
         return header_of(stamp, self._scene.frame_id)

@@ -1,4 +1,8 @@
-"""Topics out: what a scene publishes, of which types, under which names. A scene has no topic for what it has not."""
+"""Topics out: what a scene publishes, of which types, under which names. A scene has no topic for what it has not.
+
+What a scene measures under a name that would also be published, as ``/markers`` of a person, is published as ESTIMATED and that
+name: a topic has one type, and nobody listens to himself.
+"""
 
 import re
 from collections.abc import Iterable
@@ -32,11 +36,24 @@ CONSTRAINT_FORCES = "constraint_forces"
 MARKERS = "markers"
 DIAGNOSTICS = "/diagnostics"  # absolute, as every tool expects it
 
+ESTIMATED = "estimated_"
 LONGEST_NAME = 80  # characters of a force's name in its topic; a whole topic may have 247
 
 
 def topics_of(scene: Scene) -> dict[str, type[Message]]:
     """Return the topics that a scene publishes, each with its type, in the order of publishing."""
+    names = published_names(scene)
+    return {names[topic]: message_type for topic, message_type in _topics_of(scene).items()}
+
+
+def published_names(scene: Scene) -> dict[str, str]:
+    """Return topic -> the name under which a scene publishes it."""
+    measured = {source.topic.lstrip("/") for source in scene.measurements}
+    return {topic: f"{ESTIMATED}{topic}" if topic in measured else topic for topic in _topics_of(scene)}
+
+
+def _topics_of(scene: Scene) -> dict[str, type[Message]]:
+    """Return the topics by their own names."""
     topics: dict[str, type[Message]] = {}
     if scalar_links(scene.tree) or ball_links(scene.tree):
         topics[JOINT_STATES] = topics[JOINT_DEVIATIONS] = JointState

@@ -15,7 +15,7 @@ def draw(every_joint, every_joint_simulator):
 
     def drawn(estimate):
         ((topic, message),) = output.markers(estimate)
-        assert topic == "markers"
+        assert topic == "estimated_markers"  # the scene measures /markers
         return {(marker.ns, marker.id): marker for marker in message.markers}
 
     return drawn

@@ -10,7 +10,7 @@ from physics_prior.interface import Output, topics_of
 from physics_prior.interface.topics import force_topics
 from physics_prior.model import Joint, JointKind, Part, Tree
 from physics_prior.model.part import MassProperties
-from physics_prior.resources import shipped_scenes
+from physics_prior.resources import share_directory, shipped_scenes
 from physics_prior.scene import load_scene
 
 
@@ -33,6 +33,22 @@ def test_just_the_announced_topics_are_published_with_their_types(name, every_jo
     assert [topic for topic, _ in out] == list(output.topics) == list(topics_of(scene))
     for topic, message in out:
         assert type(message) is output.topics[topic]
+
+
+def test_nobody_listens_to_himself(tmp_path):
+    """The node of a person who is seen by markers on /markers could not start: it published pictures there."""
+    assert {"/markers"} == {source.topic for source in load_scene("simulated_walk").measurements}
+    topics = topics_of(load_scene("simulated_walk"))
+    assert topics["estimated_markers"].ros_type == "visualization_msgs/msg/MarkerArray"
+    assert "markers" not in topics
+    text = (share_directory() / "config" / "scenes" / "pendulum.yaml").read_text()
+    path = tmp_path / "encoder.yaml"
+    path.write_text(
+        text.replace(
+            "measurements:", "measurements:\n  - joints: {topic: joint_states, joints: {pivot: pivot}, noise: 1e-3}", 1
+        )
+    )
+    assert {"estimated_joint_states", "joint_states/stddev", "markers"} < set(topics_of(load_scene(path)))
 
 
 def test_names_are_made_valid_and_stay_different(every_joint):

@@ -7,12 +7,14 @@ import platform
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import llvmlite
 import numba
 import numpy as np
 from numba.core import event
+
+from physics_prior.dynamics.kernel_compiler import Kernel
 
 FASTMATH = {"nsz"}
 """No flag that lets rounding depend on where a kernel was inlined: the same recording gives the same bits. NaN stays visible."""
@@ -109,12 +111,10 @@ def callback(function: Callable[..., Any], signature: Any) -> int:
 
 def _compile(function: Function, inline: bool) -> Function:
     options = {"error_model": "numpy", "fastmath": FASTMATH, "forceinline": inline, "boundscheck": False}
-    # nobody calls a kernel through C: without that entry each compiles faster
     file, folder = Path(function.__code__.co_filename), cache_directory()
     if _users_package(file) is not None:
         folder /= sources_digest(file)
-    compiled: Function = _in_cache(lambda: numba.njit(cache=True, no_cfunc_wrapper=True, **options)(function), folder)
-    return compiled
+    return cast(Function, _in_cache(lambda: Kernel(function, options), folder))
 
 
 def _in_cache(decorate: Callable[[], Any], folder: Path) -> Any:

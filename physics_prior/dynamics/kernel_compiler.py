@@ -1,0 +1,204 @@
+"""A kernel's two editions: one that other kernels take in, as code not yet optimised, and one that Python calls.
+
+Numba, left alone, optimises each function, makes machine code and an entry for Python of it, and does all of that again wherever
+the function is called. Of the 140 functions of a step a dozen are called by Python: here only these are optimised and made machine
+code, once, with all that they call. On numba.core: dispatchers, passes and code libraries are what it lets others derive.
+"""
+
+from collections.abc import Callable
+from typing import Any, ClassVar, cast
+
+import llvmlite.binding as llvm
+from numba.core import typed_passes, types, untyped_passes
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompileResult, CompilerBase, compile_result
+from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.environment import lookup_environment
+from numba.core.registry import CPUDispatcher
+
+
+class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """Code for other kernels: with what it calls, to be linked into theirs. Never finalized: that is what makes machine code."""
+
+    def _ensure_finalized(self) -> None:
+        """Nothing is to be done before others link it."""
+
+    def _get_module_for_linking(self) -> Any:
+        if self._shared_module is None:
+            for library in dict.fromkeys(self._linking_libraries):
+                self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+            for function in self._final_module.functions:
+                if not function.is_declaration and function.linkage == llvm.Linkage.external:
+                    function.linkage = "linkonce_odr"  # the same function may come by several ways
+            self._shared_module = self._final_module
+        return self._shared_module
+
+
+class _EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """Machine code for Python."""
+
+    def _optimize_final_module(self) -> None:
+        # Numba runs a cheap optimisation first, which brings counts of references together: kernels count none
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
+
+
+class _Remembering:
+    """Numba's typing context, which else goes through all that an operator may mean wherever one occurs."""
+
+    _known: ClassVar[dict[Any, Any]] = {}
+
+    def __init__(self, context: Any) -> None:
+        self._context = context
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._context, name)
+
+    def resolve_function_type(self, function: Any, args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
+        if isinstance(function, types.Dispatcher):  # a kernel: its overloads remember
+            return self._context.resolve_function_type(function, args, kws)
+        key = function, tuple(args), tuple(kws.items())
+        if key not in self._known:
+            self._known[key] = self._context.resolve_function_type(function, args, kws)
+        return self._known[key]
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _TypeInference(typed_passes.NopythonTypeInference):  # type: ignore[misc]
+    _name = "kernel_type_inference"
+
+    def run_pass(self, state: Any) -> bool:
+        context, state.typingctx = state.typingctx, _Remembering(state.typingctx)
+        try:
+            return cast(bool, super().run_pass(state))
+        finally:
+            state.typingctx = context
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _InnerLowering(typed_passes.NativeLowering):  # type: ignore[misc]
+    _name = "inner_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        state.flags.no_compile = True  # no machine code
+        state.library = _InnerLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        super().run_pass(state)
+        # callers find the function by the entry that it has not: anything of its own will do
+        state.cr = state.cr._replace(cfunc=object())
+        state.targetctx.insert_user_function(state.cr.cfunc, state.cr.fndesc, [state.library])
+        return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _EntryLowering(typed_passes.NativeLowering):  # type: ignore[misc]
+    _name = "entry_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        state.library = _EntryLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        super().run_pass(state)
+        # what taken-in kernels print stands in environments of theirs
+        names = [variable.name for variable in state.library._final_module.global_variables]
+        for environment in filter(None, map(lookup_environment, names)):
+            state.library.codegen.set_env(environment.env_name, environment)
+        return True
+
+
+class _Pipeline(CompilerBase):  # type: ignore[misc]
+    """Numba's passes less those that kernels have no use for: closures, list comprehensions, parallel loops, array expressions."""
+
+    lowering: type
+
+    def define_pipelines(self) -> list[PassManager]:
+        passes = PassManager("kernel")
+        for each in (
+            untyped_passes.TranslateByteCode,
+            untyped_passes.FixupArgs,
+            untyped_passes.IRProcessing,
+            untyped_passes.RewriteSemanticConstants,
+            untyped_passes.DeadBranchPrune,  # what a scene has not: `if CONSTRAINED`
+            untyped_passes.GenericRewrites,
+            untyped_passes.ReconstructSSA,
+            _TypeInference,
+            typed_passes.PreLowerStripPhis,
+            typed_passes.NoPythonSupportedFeatureValidation,
+            typed_passes.IRLegalization,
+            typed_passes.AnnotateTypes,
+            self.lowering,
+            typed_passes.NoPythonBackend,
+        ):
+            passes.add_pass(each, each.__name__)
+        passes.finalize()
+        return [passes]
+
+
+class _InnerPipeline(_Pipeline):
+    lowering = _InnerLowering
+
+
+class _EntryPipeline(_Pipeline):
+    lowering = _EntryLowering
+
+
+class _InnerResult(CompileResultCacheImpl):  # type: ignore[misc]
+    """How an inner edition is kept on disk: its code with what it calls, and its types."""
+
+    def get_filename_base(self, fullname: str, abiflags: str) -> str:
+        return f"inner.{super().get_filename_base(fullname, abiflags)}"
+
+    def reduce(self, result: CompileResult) -> tuple[Any, ...]:
+        description = result.fndesc
+        description.typemap = description.calltypes = None  # what lowering alone needed
+        code = result.library._get_module_for_linking().as_bitcode()
+        return result.library.name, code, description, result.environment, result.signature
+
+    def rebuild(self, target_context: Any, payload: tuple[Any, ...]) -> CompileResult:
+        name, code, description, environment, signature = payload
+        library = _InnerLibrary(target_context.codegen(), name)
+        library._final_module = library._shared_module = llvm.parse_bitcode(code)
+        return compile_result(
+            target_context=target_context,
+            typing_context=target_context.typing_context,
+            library=library,
+            entry_point=object(),
+            fndesc=description,
+            environment=environment,
+            signature=signature,
+            objectmode=False,
+        )
+
+
+class _InnerCache(FunctionCache):  # type: ignore[misc]
+    _impl_class = _InnerResult
+
+
+class _Inner(CPUDispatcher):  # type: ignore[misc]
+    """The edition for other kernels."""
+
+    def enable_caching(self) -> None:
+        self._cache = _InnerCache(self.py_func)
+
+    def add_overload(self, result: CompileResult) -> None:
+        # but not with the dispatcher in C, which serves calls from Python
+        self.overloads[tuple(result.signature.args)] = result
+
+
+class Kernel(CPUDispatcher):  # type: ignore[misc]
+    """A compiled function that Python calls, and that other kernels call in its inner edition."""
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        options = {"nopython": True, "no_cfunc_wrapper": True, **options}  # nobody calls a kernel through C
+        super().__init__(function, targetoptions=options, pipeline_class=_EntryPipeline)
+        options = {**options, "no_cpython_wrapper": True}
+        self._inner = _Inner(function, targetoptions=options, pipeline_class=_InnerPipeline)
+        for edition in (self, self._inner):
+            edition.enable_caching()
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """What the type inference of a kernel that calls this one asks."""
+        return self._inner.get_call_template(args, kws)
+
+    def get_overload(self, signature: Any) -> Any:
+        """What the lowering of a kernel that calls this one asks."""
+        return self._inner.get_overload(signature)

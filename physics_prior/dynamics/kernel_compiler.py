@@ -1,8 +1,8 @@
 """A kernel's two editions: one that other kernels take in, as code not yet optimised, and one that Python calls.
 
 Numba, left alone, optimises each function, makes machine code and an entry for Python of it, and does all of that again wherever
-the function is called. Of the 140 functions of a step a dozen are called by Python: here only these are optimised and made machine
-code, once, with all that they call. On numba.core: dispatchers, passes and code libraries are what it lets others derive.
+the function is called. Of the 140 functions of a step a dozen are called by Python: here only these are optimised and made
+machine code, once, with all that they call. Dispatchers, passes and code libraries derive from Numba's.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ import llvmlite.binding as llvm
 from numba.core import typed_passes, types, untyped_passes
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompileResult, CompilerBase, compile_result
+from numba.core.compiler import CompilerBase, CompileResult, compile_result
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.environment import lookup_environment
 from numba.core.registry import CPUDispatcher
@@ -20,6 +20,8 @@ from numba.core.registry import CPUDispatcher
 
 class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc]
     """Code for other kernels: with what it calls, to be linked into theirs. Never finalized: that is what makes machine code."""
+
+    _shared_module: Any
 
     def _ensure_finalized(self) -> None:
         """Nothing is to be done before others link it."""
@@ -106,7 +108,7 @@ class _EntryLowering(typed_passes.NativeLowering):  # type: ignore[misc]
 
 
 class _Pipeline(CompilerBase):  # type: ignore[misc]
-    """Numba's passes less those that kernels have no use for: closures, list comprehensions, parallel loops, array expressions."""
+    """Numba's passes less those that kernels have no use for: closures and comprehensions, parallel loops, array expressions."""
 
     lowering: type
 

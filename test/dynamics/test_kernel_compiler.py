@@ -1,0 +1,78 @@
+"""Kernels have two editions: the one that kernels take in is never made machine code, and gives the bits of the other."""
+
+import subprocess
+import sys
+
+import pytest
+
+KERNELS = '''
+import math
+import sys
+
+import numpy as np
+
+from physics_prior.dynamics.kernel import kernel
+
+
+@kernel
+def root(x):
+    if x < 0.0:
+        raise ValueError("root of a negative number")
+    return math.sqrt(x) / 3.0
+
+
+@kernel
+def total(numbers):
+    """Said aloud: what a user does who looks for an error."""
+    result = 0.0
+    for number in numbers:
+        result += root(number)
+    print("total", result)
+    return result
+'''
+
+
+@pytest.fixture
+def use(tmp_path, monkeypatch):
+    """`use(statements) -> what they print`: in a process of its own, with the kernels above and a cache of the test."""
+    (tmp_path / "some_kernels.py").write_text(KERNELS)
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{':'.join(sys.path)}")
+    monkeypatch.setenv("PHYSICS_PRIOR_CACHE", str(tmp_path / "cache"))
+
+    def run(statements):
+        (tmp_path / "program.py").write_text(f"from some_kernels import *\n{statements}")
+        ran = subprocess.run([sys.executable, tmp_path / "program.py"], capture_output=True, text=True)
+        assert ran.returncode == 0, ran.stderr
+        return ran.stdout
+
+    return run
+
+
+def test_only_what_python_calls_is_machine_code(use):
+    told = use(
+        "total(np.ones(2))\n"
+        "print([len(each.overloads) for each in (root, root._inner, total, total._inner)])\n"
+        "print([each.library._finalized for each in (*root._inner.overloads.values(), *total.overloads.values())])"
+    )
+    assert told.splitlines()[1:] == ["[0, 1, 1, 0]", "[False, True]"]
+
+
+def test_both_editions_give_the_same_bits_fresh_and_from_the_cache(use):
+    numbers = "np.random.default_rng(0).uniform(0.0, 9.0, 50)"
+    ask = f"numbers = {numbers}\nsum = 0.0\nfor x in numbers: sum += root(x)\nprint(total(numbers).hex(), float(sum).hex())"
+    fresh, again = use(ask), use(ask)
+    assert fresh == again
+    assert len(set(fresh.splitlines()[-1].split())) == 1
+
+
+def test_errors_and_words_of_kernels_taken_in_come_out(use):
+    caller = (
+        "from physics_prior.dynamics.kernel import kernel\n"
+        "import some_kernels\n"
+        "@kernel\ndef twice(numbers):\n    return 2.0 * some_kernels.total(numbers)\n"
+        "print(twice(np.ones(3)))\n"
+        "try: twice(-np.ones(1))\nexcept ValueError as error: print(error)"
+    )
+    use("total(np.ones(1))")  # what twice takes in comes from the cache, in part
+    assert use(caller).splitlines() == ["total 1.0", "2.0", "root of a negative number"]
+    assert use("print(total(np.ones(3)))").splitlines() == ["total 1.0", "1.0"]

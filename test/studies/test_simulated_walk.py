@@ -1,5 +1,6 @@
 """The made-up walk: its motion is smooth and periodic, its forces are those of the motion, and the ground can bear them."""
 
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 
@@ -11,7 +12,9 @@ from physics_prior.estimation.estimator import Estimator
 from physics_prior.estimation.square_root import normalised_error
 from physics_prior.recording import decode, open_bag
 from physics_prior.recording.replay import replay
+from physics_prior.recording.simulate import EPOCH
 from physics_prior.recording.truth import Truth
+from physics_prior.resources import share_directory
 from physics_prior.scene import load_scene
 from physics_prior.studies.simulated_walk import CYCLE, SIDES, STANCE, STEP, Walk, main, moments
 
@@ -121,6 +124,72 @@ def test_the_bag_replays_and_each_plate_has_its_foot(walk):
     assert result.counts.gated == 0
     assert result.health_s["LOST"] < 0.05
     assert result.score["position_rmse_deg"] < 1.2  # 0.98: of knees and elbows, from 3 mm
+
+
+BELT = np.array([-2.0 * STEP / CYCLE, 0.0, 0.0])  # m/s: who walks as fast as it runs back stays where he is
+
+
+@pytest.fixture(scope="module")
+def belt(tmp_path_factory):
+    """The scene on a treadmill, by its text."""
+    text = (share_directory() / "config" / "scenes" / "simulated_walk.yaml").read_text()
+    path = tmp_path_factory.mktemp("scenes") / "treadmill.yaml"
+    path.write_text(text.replace("- ground_reaction: {", f"- ground_reaction: {{velocity: {BELT.tolist()}, "))
+    return load_scene(path)
+
+
+def seen_from_the_room(measurement):
+    """What markers would see of the walk if it were one on the belt: the ground that stands runs back."""
+    return replace(measurement, points=measurement.points + BELT * (1e-9 * (measurement.stamp - EPOCH)))
+
+
+def test_a_treadmill_is_the_ground_seen_from_the_room(walk, belt):
+    """A frame that moves evenly is as good as another (Galileo): the same joints, forces, decisions and uncertainties.
+
+    From the same posterior: through standing, lifting, swinging and landing.
+    """
+    frames = [each for _, _, measured in moments(walk.scene, walk, 3, 1.2) for each in measured]
+    filters = [Estimator(scene).filter for scene in (walk.scene, belt)]
+    estimator = Estimator(walk.scene)
+    for frame in frames[:30]:
+        estimator.add(frame)
+    ours = estimator.history.nodes[-1].posterior
+    moved = ours.state.copy()
+    moved.q[:3] += BELT * (1e-9 * (ours.stamp - EPOCH))
+    moved.v[:3] += BELT
+    theirs, grounded = replace(ours, state=moved), set()
+    for frame in frames[30:]:
+        ours, theirs = (filter.predict(each, frame.stamp) for filter, each in zip(filters, (ours, theirs), strict=True))
+        ours, theirs = filters[0].update(ours, frame), filters[1].update(theirs, seen_from_the_room(frame))
+        there, here = theirs.state.copy(), ours.state
+        there.q[:3] -= BELT * (1e-9 * (ours.stamp - EPOCH))
+        there.v[:3] -= BELT
+        assert there.grounded.tolist() == here.grounded.tolist()
+        grounded.add(tuple(here.grounded.tolist()))
+        np.testing.assert_allclose(there.q, here.q, atol=1e-12)  # 2e-15
+        np.testing.assert_allclose(there.v, here.v, atol=1e-10)  # 6e-13
+        np.testing.assert_allclose(there.force, here.force, atol=1e-8)  # N, N m: 2e-11
+        size = np.linalg.norm(ours.factor, axis=1)
+        np.testing.assert_allclose(np.linalg.norm(theirs.factor, axis=1), size, rtol=1e-10, atol=1e-12)  # 3e-14
+        assert theirs.nis == pytest.approx(ours.nis, rel=1e-10)  # 1e-14
+    assert grounded == {(True, True), (True, False), (False, True)}
+
+
+def test_who_walks_on_a_treadmill_is_found_there(walk, belt):
+    """From a cold start, which knows nothing of the belt: what the ground does is as over ground, and he stays in place."""
+    estimators = [Estimator(walk.scene), Estimator(belt)]
+    off = []
+    for stamp, _, measured in moments(walk.scene, walk, 4, 1.2):
+        for each in measured:
+            estimators[0].add(each)
+            estimators[1].add(seen_from_the_room(each))
+        if stamp - EPOCH > 0.6e9:
+            ground, treadmill = (each.estimate() for each in estimators)
+            off.append(
+                [treadmill.wrenches[f"{side}_sole"].force - ground.wrenches[f"{side}_sole"].force for side in SIDES]
+            )
+    assert np.max(np.abs(off)) < 0.01  # N: 2e-4, and 4e-7 after 1.2 s
+    assert abs(treadmill.q[0] - walk.at(0.0).q[0]) < 0.1
 
 
 def errors(walk, seed):

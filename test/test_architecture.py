@@ -17,7 +17,7 @@ ROOMS = [
     ("errors", "resources", "rotations"),
     ("inertia",),
     ("model",),
-    ("dynamics.kernel", "dynamics.types", "dynamics.algebra", "dynamics.spatial")
+    ("dynamics.kernel", "dynamics.kernel_compiler", "dynamics.types", "dynamics.algebra", "dynamics.spatial")
     + ("dynamics.rotation_vector", "dynamics.point_force"),
     ("effects",),
     ("dynamics",),

@@ -3,6 +3,7 @@
 With --peers, Pinocchio and MuJoCo (their PyPI wheels, extra 'bench') take turns with ours in one run on one core; a ratio
 above 1 means that we are faster. Before anything is timed, the engines' results are compared. Then the estimator, predict and
 update with its covariance, on the same tree in motion: its split, and, where biorbd is installed, that one's Kalman filter.
+Last a person who walks, with muscles and ground forces and all outputs: how many times faster than real time, at 100 Hz.
 
 With --effects, each built-in effect is taken out of a copy of the program instead, and scenes that do not name it are compiled
 and run in both: the same bits, the same instructions. Then scenes that name little and much are compiled from a cold cache and
@@ -50,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
         return _effects(args)
     if args.sleep:
         return _sleep(args)
-    from physics_prior.studies import bench_estimator
+    from physics_prior.studies import bench_estimator, bench_person
     from physics_prior.studies.bench import run_bench, table
 
     with progress("timing") as report:
@@ -60,6 +61,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json != STDOUT:
         console().print(table(figures))
         console().print(bench_estimator.table(figures))
+        console().print(bench_person.table(figures))
     return 0
 
 

@@ -24,11 +24,12 @@ from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects.attachment import Attachment
 from physics_prior.effects.gravity import Gravity
 from physics_prior.errors import PhysicsPriorError, SimulationError
+from physics_prior.studies import bench_person
 from physics_prior.studies.bench_estimator import RATIOS as ESTIMATOR_RATIOS
 from physics_prior.studies.bench_estimator import time_estimator
 from physics_prior.studies.bench_models import HELD_FEET, PinocchioModel, humanlike, mjcf
 
-KERNELS_SHARE = 0.3  # of the time; the rest is the estimator's
+KERNELS_SHARE, ESTIMATOR_SHARE = 0.25, 0.55  # of the time; the rest is the person's
 ROUNDS, CALLS = 200, 40  # a round times every contestant once, over so many calls
 STEP_SIZE = 1e-3  # s
 AGREEMENT = 1e-9  # relative: engines that differ by more do not compute the same
@@ -178,7 +179,7 @@ class Peers:
 
 
 def run_bench(peers: bool, progress: Callable[[float], None] = lambda share: None) -> dict[str, Any]:
-    """Time ours, and with ``peers`` the others; return ``ratios``, ``us`` (medians, microseconds a call) and ``machine``.
+    """Time ours, and with ``peers`` the others; return ``ratios``, ``us`` (medians a call), ``real_time`` and ``machine``.
 
     Args:
         peers: whether Pinocchio and MuJoCo, and biorbd where it is installed, take part.
@@ -202,9 +203,13 @@ def run_bench(peers: bool, progress: Callable[[float], None] = lambda share: Non
         restarts.append(theirs.restart)
     with one_core():
         us = _medians(contestants, restarts, lambda done, total: progress(KERNELS_SHARE * done / total))
-        us |= time_estimator(peers, lambda share: progress(KERNELS_SHARE + (1.0 - KERNELS_SHARE) * share))
+        us |= time_estimator(peers, lambda share: progress(KERNELS_SHARE + ESTIMATOR_SHARE * share))
+        us |= bench_person.time_person(
+            lambda share: progress(1.0 - (1.0 - KERNELS_SHARE - ESTIMATOR_SHARE) * (1.0 - share))
+        )
     ratios = {name: us[peer] / us[own] for name, (own, peer) in (RATIOS | ESTIMATOR_RATIOS).items() if peer in us}
-    return {"ratios": ratios, "us": us, "machine": machine(peers)}
+    real_time = {bench_person.NAME: bench_person.real_time_factor(us)}
+    return {"ratios": ratios, "us": us, "real_time": real_time, "machine": machine(peers)}
 
 
 def table(figures: dict[str, Any]) -> Table:

@@ -9,8 +9,10 @@ import pytest
 from physics_prior import cli
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.errors import PhysicsPriorError, SimulationError
-from physics_prior.studies import bench, bench_estimator
+from physics_prior.estimation.estimator import Estimator
+from physics_prior.studies import bench, bench_estimator, bench_person
 from physics_prior.studies.bench_models import HELD_FEET, humanlike, mjcf
+from physics_prior.studies.simulated_walk import Walk, moments
 
 NAMES = {
     "forward_dynamics_vs_pin",
@@ -28,6 +30,8 @@ def short(monkeypatch):
     monkeypatch.setattr(bench_estimator, "SECONDS", 0.5)
     monkeypatch.setattr(bench_estimator, "PENDULUM_SECONDS", 0.5)
     monkeypatch.setattr(bench_estimator, "LAPS", 1)
+    monkeypatch.setattr(bench_person, "SECONDS", 0.3)
+    monkeypatch.setattr(bench_person, "LAPS", 1)
 
 
 def test_tree_has_16_bodies_and_35_degrees_of_freedom():
@@ -44,6 +48,8 @@ def test_figures_of_ours_alone(short):
     assert {own for own, _ in bench.RATIOS.values()} < set(us)
     assert all(value > 0.0 for value in us.values())
     assert {f"estimator_poses_{name}" for name in bench_estimator.SPLIT} < set(us)
+    assert figures["real_time"] == {"person_at_100_hz": pytest.approx(1e4 / us["person"])}
+    assert us["person_worst"] >= us["person"] > max(us["person_filter"], us["person_outputs"])
     assert told == sorted(told)
     assert told[-1] == 1.0
 
@@ -52,10 +58,27 @@ def test_command_writes_figures_and_a_table(short, tmp_path, capsys):
     path = tmp_path / "bench.json"
     assert cli.main(["bench", "--json", str(path)]) == 0
     figures = json.loads(path.read_text())
-    assert set(figures) == {"ratios", "us", "machine"}
+    assert set(figures) == {"ratios", "us", "real_time", "machine"}
     out = capsys.readouterr().out
     assert "forward dynamics" in out
     assert "48 markers" in out
+    assert "45 markers at 100 Hz" in out
+
+
+def test_the_person_who_is_timed_walks_and_is_followed():
+    """Every frame is believed, and both feet lift and land."""
+    scene = bench_person.walking(1.4)
+    walk = Walk(scene, scene.simulator())
+    estimator, stood = Estimator(scene), set()
+    for _, instant, measured in moments(scene, walk, 0, 1.4):
+        for each in measured:
+            estimator.add(each)
+        if estimator.ready:
+            state = estimator.history.nodes[-1].posterior.state
+            stood.add(tuple(state.grounded.tolist()))
+            assert np.linalg.norm(state.q[:3] - instant.q[:3]) < 0.01  # m: 2 mm
+    assert estimator.counts.gated == 0
+    assert stood == {(True, True), (True, False), (False, True)}
 
 
 def test_peers_agree_and_give_ratios(short):

@@ -8,8 +8,6 @@ import math
 
 import numpy as np
 
-from physics_prior import rotations
-
 AXES = (("y", np.array([0.0, 1.0, 0.0])), ("x", np.array([1.0, 0.0, 0.0])), ("z", np.array([0.0, 0.0, 1.0])))
 """What the hinges turn about, with what their names end on, as hip_y."""
 SINGULAR = 1e-6  # cosine of the middle angle: nearer to it, rates are those at this one
@@ -22,11 +20,11 @@ def hinge_names(joint: str) -> tuple[str, ...]:
 
 def hinge_angles(q: np.ndarray) -> np.ndarray:
     """(3,) rad, the hinges' angles at the quaternion q (4,); the middle one in [-pi/2, pi/2]."""
-    R = rotations.matrix_from_quaternion(q)
+    w, x, y, z = q.tolist()
     # column 2 of R is (sin a cos b, -sin b, cos a cos b), row 1 (cos b sin c, cos b cos c, -sin b)
-    return np.array(
-        [np.arctan2(R[0, 2], R[2, 2]), np.arcsin(np.clip(-R[1, 2], -1.0, 1.0)), np.arctan2(R[1, 0], R[1, 1])]
-    )
+    a = math.atan2(2.0 * (x * z + w * y), w * w - x * x - y * y + z * z)
+    b = math.asin(min(max(2.0 * (w * x - y * z), -1.0), 1.0))
+    return np.array([a, b, math.atan2(2.0 * (x * y + w * z), w * w - x * x + y * y - z * z)])
 
 
 def rates_per_omega(angles: np.ndarray) -> np.ndarray:

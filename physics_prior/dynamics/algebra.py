@@ -282,6 +282,23 @@ def rotated_inertia(R: Matrix, m: Symmetric) -> Symmetric:
 
 
 @inline_kernel
+def rotated_diagonal(R: Matrix, m: Symmetric) -> Symmetric:
+    """The symmetric matrix R m R^T of a diagonal m (6-tuple), R a rotation: c 1 + (a - c) r r^T + (b - c) s s^T."""
+    rest = m[5]
+    a, b = m[0] - rest, m[3] - rest
+    r, s = (R[0], R[3], R[6]), (R[1], R[4], R[7])
+    p, q = scale(a, r), scale(b, s)
+    return (
+        fma(q[0], s[0], fma(p[0], r[0], rest)),
+        fma(q[0], s[1], p[0] * r[1]),
+        fma(q[0], s[2], p[0] * r[2]),
+        fma(q[1], s[1], fma(p[1], r[1], rest)),
+        fma(q[1], s[2], p[1] * r[2]),
+        fma(q[2], s[2], fma(p[2], r[2], rest)),
+    )
+
+
+@inline_kernel
 def symmetric_inverse(m: Symmetric) -> Symmetric:
     """The inverse of a symmetric 6-tuple by cofactors."""
     c0 = determinant(m[3], m[5], m[4], m[4])
@@ -301,28 +318,24 @@ def symmetric_inverse(m: Symmetric) -> Symmetric:
 @inline_kernel
 def solve3(m: Matrix, u: Vector) -> Vector:
     """The solution x of m x = u for a 3x3 matrix (9-tuple) by cofactors."""
-    c0 = m[4] * m[8] - m[5] * m[7]
-    c1 = m[5] * m[6] - m[3] * m[8]
-    c2 = m[3] * m[7] - m[4] * m[6]
-    d = 1.0 / (m[0] * c0 + m[1] * c1 + m[2] * c2)
-    return (
-        (c0 * u[0] + (m[2] * m[7] - m[1] * m[8]) * u[1] + (m[1] * m[5] - m[2] * m[4]) * u[2]) * d,
-        (c1 * u[0] + (m[0] * m[8] - m[2] * m[6]) * u[1] + (m[2] * m[3] - m[0] * m[5]) * u[2]) * d,
-        (c2 * u[0] + (m[1] * m[6] - m[0] * m[7]) * u[1] + (m[0] * m[4] - m[1] * m[3]) * u[2]) * d,
-    )
+    a, b, c = (m[0], m[3], m[6]), (m[1], m[4], m[7]), (m[2], m[5], m[8])
+    p, q, r = cross(b, c), cross(c, a), cross(a, b)
+    d = 1.0 / dot(a, p)
+    return dot(p, u) * d, dot(q, u) * d, dot(r, u) * d
 
 
 @inline_kernel
 def rotation_of(w: float, x: float, y: float, z: float) -> Matrix:
     """The rotation matrix of a unit quaternion (design eq. 1, the element (1, 3) corrected)."""
+    a, b, c = 2.0 * x, 2.0 * y, 2.0 * z
     return (
-        1.0 - 2.0 * (y * y + z * z),
-        2.0 * (x * y - w * z),
-        2.0 * (x * z + w * y),
-        2.0 * (x * y + w * z),
-        1.0 - 2.0 * (x * x + z * z),
-        2.0 * (y * z - w * x),
-        2.0 * (x * z - w * y),
-        2.0 * (y * z + w * x),
-        1.0 - 2.0 * (x * x + y * y),
+        fma(-b, y, fma(-c, z, 1.0)),
+        determinant(a, y, c, w),
+        fma(a, z, b * w),
+        fma(a, y, c * w),
+        fma(-a, x, fma(-c, z, 1.0)),
+        determinant(b, z, a, w),
+        determinant(a, z, b, w),
+        fma(b, z, a * w),
+        fma(-a, x, fma(-b, y, 1.0)),
     )

@@ -153,10 +153,6 @@ def factorize(links: Records, work: Records) -> None:
                 J = _minus_symmetric(J, a, n)
                 M = _minus_symmetric(M, b, f)
                 H = minus_outer(H, a, f)
-                # the reduced inertia, which is what the parent feels and what the bias runs through
-                put6(here.J, J)
-                put9(here.H, H)
-                put6(here.M, M)
                 shift_to_parent(work[link.parent], get3(here.arm), J, H, M)
         else:
             inverse = symmetric_inverse(J)
@@ -199,13 +195,14 @@ def gather(links: Records, work: Records, tau: Array) -> None:
             u = tau[n] - dot(get3(here.axis), moment if link.kind == REVOLUTE else force)
             here.u[0] = u
             if link.parent >= 0:
-                share = u * here.D
                 angular, linear = get3(here.coriolis_angular), get3(here.coriolis_linear)
-                H = get9(here.H)
+                H, across, along = get9(here.H), get3(here.U_moment), get3(here.U_force)
+                # what the joint gives way by its own force and to what is carried
+                share = here.D * (u - dot(across, angular) - dot(along, linear))
                 carried = plus(symmetric_times(get6(here.J), angular), times(H, linear))
-                moment = plus(moment, plus(carried, scale(share, get3(here.U_moment))))
+                moment = plus(moment, plus(carried, scale(share, across)))
                 carried = plus(transposed_times(H, angular), symmetric_times(get6(here.M), linear))
-                force = plus(force, plus(carried, scale(share, get3(here.U_force))))
+                force = plus(force, plus(carried, scale(share, along)))
         else:
             first = n + 3 if link.kind == FREE else n
             torque = times(get9(here.rotation), (tau[first], tau[first + 1], tau[first + 2]))

@@ -54,10 +54,10 @@ def width(rows: Array) -> int:
 
 
 @inline_kernel
-def bounds(rows: Array, r: int) -> tuple[int, int, int]:
-    """Where a row's columns begin and end, and the row behind the last one it is coupled to."""
+def bounds(rows: Array, r: int) -> tuple[int, int, int, int]:
+    """Where a row's columns begin and end, the first row that it is coupled to, and that behind the last."""
     last = rows.shape[1] - BOUNDS
-    return int(rows[r, last]), int(rows[r, last + 1]), int(rows[r, last + 2])
+    return int(rows[r, last]), int(rows[r, last + 1]), int(rows[r, last + 2]), int(rows[r, last + 3])
 
 
 @inline_kernel
@@ -88,7 +88,7 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: 
     for p in range(pairs.shape[0]):
         pair = pairs[p]
         first, last = pair.first, pair.first + pair.rows
-        begin, end, _ = bounds(rows, first)
+        begin, end, _, _ = bounds(rows, first)
         for r in range(first, last):
             for k in range(begin, end):
                 rows[r, k] = 0.0
@@ -103,12 +103,12 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: 
     S, L = rows[:, 2 * w : 2 * w + m], rows[:, 2 * w + m : 2 * w + 2 * m]
     for p in range(pairs.shape[0]):
         first, count = pairs[p].first, pairs[p].rows
-        begin, end, reach = bounds(rows, first)
+        begin, end, _, reach = bounds(rows, first)
         for o in range(p, pairs.shape[0]):
             other, number = pairs[o].first, pairs[o].rows
             if other >= reach:
                 break
-            from_, to, _ = bounds(rows, other)
+            from_, to, _, _ = bounds(rows, other)
             block = _overlap(rows, first, count, other, number, w, max(begin, from_), min(end, to))
             for r in range(count):
                 for s in range(number):
@@ -117,26 +117,27 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: 
                         L[first + r, other + s] = block[3 * r + s]
     weigh_rows(pairs, S, scales, active)
     rank, least = 0, math.inf
-    for r in range(m):
-        L[r, r] += REGULARISATION * scales[r]
     for p in range(pairs.shape[0]):
         pair = pairs[p]
-        for r in range(pair.first, pair.first + pair.rows):
-            _, _, reach = bounds(rows, r)
-            epsilon, pivot = REGULARISATION * scales[r], L[r, r]
+        for s in range(pair.first, pair.first + pair.rows):
+            _, _, first, _ = bounds(rows, s)
+            for r in range(first, s):
+                left = L[r, s]
+                for k in range(first, r):
+                    left = fma(-L[k, r], L[k, s], left)
+                L[r, s] = left
+            epsilon = REGULARISATION * scales[s]
+            pivot = L[s, s] + epsilon
+            for r in range(first, s):
+                factor = L[r, s] * L[r, r]
+                pivot = fma(-factor, L[r, s], pivot)
+                L[r, s] = factor
             if pivot > DEPENDENT * epsilon:
                 rank += 1
             pivot = max(pivot, 1e-3 * epsilon)
             if pair.active:
-                least = min(least, pivot / scales[r])
-            inverse = 1.0 / pivot
-            L[r, r] = inverse
-            for s in range(r + 1, reach):
-                factor = L[r, s] * inverse
-                for k in range(s, reach):
-                    L[s, k] = fma(-factor, L[r, k], L[s, k])
-            for s in range(r + 1, reach):
-                L[r, s] *= inverse
+                least = min(least, pivot / scales[s])
+            L[s, s] = 1.0 / pivot
     known[-2] = rank
     known[-1] = max(POSITION_TOLERANCE * math.sqrt(least), ROUNDING)
 
@@ -167,7 +168,7 @@ def weigh_rows(pairs: Records, S: Array, scales: Array, active: int) -> None:
 
 
 @kernel
-def multiply(rows: Array, refinements: int) -> float:
+def multiply(rows: Array) -> float:
     """Solve A M^-1 A^T answer = right side, proximally; return how much of the right side is left, relative to it.
 
     Fills the answer, spoils the right side.
@@ -178,36 +179,45 @@ def multiply(rows: Array, refinements: int) -> float:
     for r in range(m):
         answer[r] = 0.0
         size = max(size, abs(left[r]))
-    for _ in range(refinements):
-        for r in range(m):
-            change[r] = left[r]
-        for s in range(m):
-            _, _, reach = bounds(rows, s)
-            known, L = change[s], rows[s, 2 * w + m :]
-            for r in range(s + 1, reach):
-                change[r] = fma(-known, L[r], change[r])
-            change[s] = known * L[s]
-        for s in range(m - 1, -1, -1):
-            _, _, reach = bounds(rows, s)
-            known, L = change[s], rows[s, 2 * w + m :]
-            for r in range(s + 1, reach):
-                known = fma(-L[r], change[r], known)
-            change[s] = known
-            answer[s] += known
-        for s in range(m):
-            _, _, reach = bounds(rows, s)
-            known, S = change[s], rows[s, 2 * w :]
-            met = S[s] * known
-            for r in range(s + 1, reach):
-                left[r] = fma(-known, S[r], left[r])
-                met = fma(S[r], change[r], met)
-            left[s] -= met
+    for _ in range(REFINEMENTS):
+        _solve(rows, change)
         rest = 0.0
-        for r in range(m):
-            rest = max(rest, abs(left[r]))
+        for s in range(m):
+            _, _, first, reach = bounds(rows, s)
+            before, after = 0.0, 0.0
+            for r in range(first, s):
+                before = fma(rows[r, 2 * w + s], change[r], before)
+            for r in range(s, reach):
+                after = fma(rows[s, 2 * w + r], change[r], after)
+            left[s] -= before + after
+            answer[s] += change[s]
+            rest = max(rest, abs(left[s]))
         if rest <= EXACT * size:
             break
     return rest / size if size > 0.0 else 0.0
+
+
+@kernel
+def multiply_once(rows: Array) -> None:
+    """Do so without refinement: the answer is good to the regularisation, and the right side stays."""
+    _solve(rows, rows[row_count(rows) + 1])
+
+
+@inline_kernel
+def _solve(rows: Array, out: Array) -> None:
+    """Fill out (m,) from the right side by the regularised factor; sums whose last term is the last that is known."""
+    m, w = row_count(rows), width(rows)
+    left, L = rows[m], rows[:, 2 * w + m : 2 * w + 2 * m]
+    for s in range(m):
+        known = left[s]
+        for r in range(bounds(rows, s)[2], s):
+            known = fma(-L[r, s], out[r], known)
+        out[s] = known
+    for s in range(m - 1, -1, -1):
+        known = out[s] * L[s, s]
+        for r in range(bounds(rows, s)[3] - 1, s, -1):
+            known = fma(-L[s, r], out[r], known)
+        out[s] = known
 
 
 @kernel
@@ -216,7 +226,7 @@ def gather_rows(pairs: Records, rows: Array, offset: int, out: Array) -> None:
     answer = rows[row_count(rows) + 1]
     for p in range(pairs.shape[0]):
         first, n = pairs[p].first, pairs[p].rows
-        begin, end, _ = bounds(rows, first)
+        begin, end, _, _ = bounds(rows, first)
         a, b, c = rows[first, offset:], rows[first + min(n - 1, 1), offset:], rows[first + n - 1, offset:]
         x, y, z = answer[first], 0.0, 0.0
         if n > 1:
@@ -253,18 +263,18 @@ def multiply_columns(rows: Array, left: Array, answer: Array, change: Array) -> 
     for _ in range(REFINEMENTS):
         copy(left, change)
         for s in range(m):
-            _, _, reach = bounds(rows, s)
+            _, _, _, reach = bounds(rows, s)
             for r in range(s + 1, reach):
                 _subtract(rows[s, 2 * w + m + r], change[s], change[r])
             for c in range(change.shape[1]):
                 change[s, c] *= rows[s, 2 * w + m + s]
         for s in range(m - 1, -1, -1):
-            _, _, reach = bounds(rows, s)
+            _, _, _, reach = bounds(rows, s)
             for r in range(s + 1, reach):
                 _subtract(rows[s, 2 * w + m + r], change[r], change[s])
         accumulate(1.0, change, answer)
         for s in range(m):
-            _, _, reach = bounds(rows, s)
+            _, _, _, reach = bounds(rows, s)
             _subtract(rows[s, 2 * w + s], change[s], left[s])
             for r in range(s + 1, reach):
                 _subtract(rows[s, 2 * w + r], change[s], left[r])
@@ -324,7 +334,7 @@ def accelerate_constrained(
     gather(links, work, tau)
     release(links, work, gravity, w, vdot)
     acceleration_error(work, pairs, gravity, rows[row_count(rows)])
-    unmet = multiply(rows, REFINEMENTS)
+    unmet = multiply(rows)
     clear(scratch)
     gather_rows(pairs, rows, 0, scratch)
     load_joints(links, work, w, scratch)

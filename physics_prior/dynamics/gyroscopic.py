@@ -26,7 +26,9 @@ from physics_prior.dynamics.records import FREE, SPHERICAL
 from physics_prior.dynamics.types import Matrix, Record, Records, Symmetric, Vector
 
 NEWTON_ITERATIONS = 20
-NEWTON_TOLERANCE = 1e-24  # of the square of the angular velocity: the next change is smaller by step * change
+NEWTON_TOLERANCE = (
+    1e-24  # of the square of the angular velocity: what the next change would be, at the rate of the last
+)
 
 
 @inline_kernel
@@ -51,7 +53,7 @@ def spin_matrix(inertia: Symmetric, omega: Vector) -> Matrix:
 @inline_kernel
 def middle_rate(inertia: Symmetric, omega: Vector, step: float) -> Vector:
     """The angular velocity in the middle of a free body's step, by Newton's method with its first slope."""
-    after = omega
+    after, before = omega, dot(omega, omega)
     slope = sum9(full(inertia), scale9(0.5 * step, spin_matrix(inertia, omega)))
     for _ in range(NEWTON_ITERATIONS):
         middle = scale(0.5, plus(omega, after))
@@ -61,8 +63,10 @@ def middle_rate(inertia: Symmetric, omega: Vector, step: float) -> Vector:
         )
         change = solve3(slope, error)
         after = minus(after, change)
-        if dot(change, change) <= NEWTON_TOLERANCE * dot(after, after):
+        size = dot(change, change)
+        if size * size <= NEWTON_TOLERANCE * before * dot(after, after):
             break
+        before = size
     return scale(0.5, plus(omega, after))
 
 

@@ -1,12 +1,11 @@
 """Kinematics: where every link is, how it moves and what its velocity alone adds to its acceleration."""
 
-import math
-
 from physics_prior.dynamics.algebra import (
     IDENTITY,
     ZERO,
     cross,
     dot,
+    dots,
     get3,
     get6,
     get9,
@@ -16,6 +15,7 @@ from physics_prior.dynamics.algebra import (
     put3,
     put6,
     put9,
+    rotated_diagonal,
     rotated_inertia,
     rotation_of,
     scale,
@@ -25,6 +25,7 @@ from physics_prior.dynamics.algebra import (
 from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import ALL, FREE, PRISMATIC, REVOLUTE, SPHERICAL
+from physics_prior.dynamics.trigonometry import sine_and_cosine
 from physics_prior.dynamics.types import Array, Matrix, Record, Records, Spatial, Vector
 
 
@@ -89,7 +90,8 @@ def weigh(links: Records, work: Records) -> None:
         link, here = links[i], work[i]
         R = get9(here.rotation)
         put3(here.center, times(R, get3(link.center)))
-        put6(here.inertia, rotated_inertia(R, get6(link.inertia)))
+        m = get6(link.inertia)
+        put6(here.inertia, rotated_diagonal(R, m) if link.principal else rotated_inertia(R, m))
 
 
 @inline_kernel
@@ -142,21 +144,22 @@ def flow_part(links: Records, work: Records, v: Array, end: int) -> None:
 @inline_kernel
 def turned_about(R: Matrix, local: Vector, axis: Vector, angle: float) -> Matrix:
     """The rotation matrix R turned by an angle about a unit axis, ``local`` in R's axes and ``axis`` = R local (Rodrigues)."""
-    s, c = math.sin(angle), math.cos(angle)
+    s, c = sine_and_cosine(angle)
     k = scale(1.0 - c, axis)
+    x, y, z = local
     a = cross((R[0], R[1], R[2]), local)
     b = cross((R[3], R[4], R[5]), local)
     d = cross((R[6], R[7], R[8]), local)
     return (
-        c * R[0] + k[0] * local[0] + s * a[0],
-        c * R[1] + k[0] * local[1] + s * a[1],
-        c * R[2] + k[0] * local[2] + s * a[2],
-        c * R[3] + k[1] * local[0] + s * b[0],
-        c * R[4] + k[1] * local[1] + s * b[1],
-        c * R[5] + k[1] * local[2] + s * b[2],
-        c * R[6] + k[2] * local[0] + s * d[0],
-        c * R[7] + k[2] * local[1] + s * d[1],
-        c * R[8] + k[2] * local[2] + s * d[2],
+        dots(c, k[0], s, R[0], x, a[0]),
+        dots(c, k[0], s, R[1], y, a[1]),
+        dots(c, k[0], s, R[2], z, a[2]),
+        dots(c, k[1], s, R[3], x, b[0]),
+        dots(c, k[1], s, R[4], y, b[1]),
+        dots(c, k[1], s, R[5], z, b[2]),
+        dots(c, k[2], s, R[6], x, d[0]),
+        dots(c, k[2], s, R[7], y, d[1]),
+        dots(c, k[2], s, R[8], z, d[2]),
     )
 
 

@@ -6,7 +6,7 @@ the coordinates theta of q = q0 [+] theta (Munthe-Kaas 1999), a plain vector spa
 
 import math
 
-from physics_prior.dynamics.algebra import cross, dot, plus, scale
+from physics_prior.dynamics.algebra import cross, dot, dot_on, fma, plus, scale
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import ALL, FREE, SPHERICAL
 from physics_prior.dynamics.rotation_vector import exponential, right_jacobian, rotation_back, second_coefficient
@@ -59,11 +59,13 @@ def displace_part(links: Records, q: Array, delta: Array, begin: int, end: int, 
                 k, n = k + 3, n + 3
             w, x, y, z = q[k], q[k + 1], q[k + 2], q[k + 3]
             a, b, c, d = exponential(delta[n], delta[n + 1], delta[n + 2])
-            out0 = w * a - x * b - y * c - z * d
-            out1 = w * b + x * a + y * d - z * c
-            out2 = w * c - x * d + y * a + z * b
-            out3 = w * d + x * c - y * b + z * a
-            norm = 1.0 / math.sqrt(out0 * out0 + out1 * out1 + out2 * out2 + out3 * out3)
+            out0 = dot_on(w * a, -x, -y, -z, b, c, d)
+            out1 = dot_on(w * b, x, y, -z, a, d, c)
+            out2 = dot_on(w * c, -x, y, z, d, a, b)
+            out3 = dot_on(w * d, x, -y, z, c, b, a)
+            square = dot_on(out0 * out0, out1, out2, out3, out1, out2, out3)
+            # the root's first terms, exact where the norm is one but for rounding: always but for what a user gives
+            norm = fma(-0.5, square, 1.5) if abs(square - 1.0) < 1e-8 else 1.0 / math.sqrt(square)
             out[k], out[k + 1], out[k + 2], out[k + 3] = out0 * norm, out1 * norm, out2 * norm, out3 * norm
         else:
             out[k] = q[k] + delta[n]

@@ -4,7 +4,7 @@ import math
 
 from physics_prior.dynamics.arrays import accumulate, clear
 from physics_prior.dynamics.articulated_body import pull
-from physics_prior.dynamics.constraint import REFINEMENTS, complete, gather_rows, multiply, respond, row_count, width
+from physics_prior.dynamics.constraint import complete, gather_rows, multiply, multiply_once, respond, row_count, width
 from physics_prior.dynamics.constraint_errors import place, position_error, velocity_error
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kinematics import flow_part, pose_part
@@ -54,7 +54,10 @@ def project(
             follow(links, work, w, rest, delta, q)
             complete(links, work, pairs, rows, known, q)
         before, exact = error, slow
-        multiply(rows, REFINEMENTS if exact else 1)
+        if exact:
+            multiply(rows)
+        else:
+            multiply_once(rows)
         clear(z)
         clear(delta)
         gather_rows(pairs, rows, w, z)
@@ -62,9 +65,11 @@ def project(
         farthest = 0.0
         for k in range(v.shape[0]):
             farthest = max(farthest, abs(delta[k]))
-        share = FARTHEST / farthest if farthest > FARTHEST else 1.0
-        for k in range(v.shape[0]):
-            delta[k] *= share
+        share = 1.0
+        if farthest > FARTHEST:
+            share = FARTHEST / farthest
+            for k in range(v.shape[0]):
+                delta[k] *= share
         accumulate(share, z, rest)
         displace_part(links, q, delta, 0, w, q)
         pose_part(links, work, q, 0, w)
@@ -91,7 +96,7 @@ def project_velocity(links: Records, work: Records, pairs: Records, rows: Array,
     """Put v (nv,) onto the constraints by the impulse that takes it there (design eq. 9); needs factors and rows of q."""
     flow_part(links, work, v, width(rows))
     velocity_error(work, pairs, rows[row_count(rows)])
-    multiply(rows, REFINEMENTS)
+    multiply(rows)
     respond(links, work, pairs, rows, spare[0], spare[1])
     for k in range(v.shape[0]):
         v[k] += spare[1, k]

@@ -11,8 +11,8 @@ from physics_prior.model.joint import FREEDOMS
 
 ALL = 1 << 62
 """Beyond every column: the end of a range that leaves no link out."""
-BOUNDS = 3
-"""Numbers at the end of a constraint row: where its columns begin and end, and the row behind the last that shares any."""
+BOUNDS = 4
+"""Numbers at the end of a constraint row: where its columns begin and end, the first row coupled to it, that behind the last."""
 REVOLUTE, PRISMATIC, SPHERICAL, FREE = (int(kind) for kind in JointKind if kind is not JointKind.FIXED)
 
 LINK = np.dtype(
@@ -23,6 +23,7 @@ LINK = np.dtype(
         ("v", "i8"),  # first degree of freedom in v
         ("column", "i8"),  # the same in the order of constraint rows: what constraints move comes first
         ("turned", "i8"),  # whether the placement turns at all
+        ("principal", "i8"),  # whether the link's axes are its principal ones: an inertia that is diagonal
         ("axis", "f8", 3),  # joint axis in the link frame
         ("position", "f8", 3),  # joint in the parent link's frame, m
         ("placement", "f8", 9),  # rotation matrix, link to parent link at zero
@@ -119,6 +120,7 @@ def link_records(tree: Tree, *touched: np.ndarray) -> np.ndarray:
         record["turned"] = not np.array_equal(record["placement"], np.eye(3).ravel())
         record["mass"], record["center"] = link.mass_properties.mass, link.mass_properties.center_of_mass
         record["inertia"] = inertia[np.triu_indices(3)]
+        record["principal"] = np.array_equal(inertia, np.diag(np.diag(inertia)))
     return records
 
 
@@ -144,7 +146,7 @@ def pair_records(tree: Tree, pairs: list[PointPair]) -> np.ndarray:
 
 
 def row_bounds(links: np.ndarray, pairs: np.ndarray, columns: int) -> np.ndarray:
-    """The BOUNDS (m, 3) of the pairs' rows; the last number never falls, as elimination fills rows in."""
+    """The BOUNDS (m, 4) of the pairs' rows; the last two numbers never fall, as elimination fills rows in."""
     moved = np.zeros((int(pairs["rows"].sum()), columns), dtype=bool)
     for pair in pairs:
         for i in (int(pair["link_a"]), int(pair["link_b"])):
@@ -154,8 +156,8 @@ def row_bounds(links: np.ndarray, pairs: np.ndarray, columns: int) -> np.ndarray
                 i = int(links[i]["parent"])
     begin, end = moved.argmax(axis=1), columns - moved[:, ::-1].argmax(axis=1)
     meet = (begin[:, None] < end) & (begin < end[:, None])
-    reach = len(moved) - meet[:, ::-1].argmax(axis=1)
-    return np.stack([begin, end, np.maximum.accumulate(reach)], axis=1)
+    reach = np.maximum.accumulate(len(moved) - meet[:, ::-1].argmax(axis=1))
+    return np.stack([begin, end, np.searchsorted(reach, np.arange(len(moved)), side="right"), reach], axis=1)
 
 
 def motion_tables(tree: Tree, pairs: list[PointPair], records: np.ndarray, begin: int) -> np.ndarray:

@@ -5,21 +5,23 @@ Source: Sola 2017, "Quaternion kinematics for the error-state Kalman filter", eq
 
 import math
 
+from physics_prior.dynamics.algebra import dots
 from physics_prior.dynamics.kernel import inline_kernel
+from physics_prior.dynamics.trigonometry import EIGHTH, cosine_of, sine_and_cosine, sine_over
 from physics_prior.dynamics.types import Matrix, Vector
 
 
 @inline_kernel
 def exponential(x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """The unit quaternion of a rotation vector, safe at zero."""
-    square = x * x + y * y + z * z
-    if square < 1e-8:
-        # sin(a/2)/a and cos(a/2) to the sixth order
-        s = 0.5 - square / 48.0 + square * square / 3840.0
-        return 1.0 - square / 8.0 + square * square / 384.0, s * x, s * y, s * z
-    angle = math.sqrt(square)
-    s = math.sin(0.5 * angle) / angle
-    return math.cos(0.5 * angle), s * x, s * y, s * z
+    quarter = 0.25 * dots(x, y, z, x, y, z)
+    if quarter < EIGHTH:
+        s = 0.5 * sine_over(quarter)
+        return cosine_of(quarter), s * x, s * y, s * z
+    half = math.sqrt(quarter)
+    sine, cosine = sine_and_cosine(half)
+    s = 0.5 * sine / half
+    return cosine, s * x, s * y, s * z
 
 
 @inline_kernel

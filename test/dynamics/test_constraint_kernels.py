@@ -230,6 +230,7 @@ def test_loops_in_a_row_couple_neighbours_only(far):
     expected = mixed_accelerations(benchmark.tree, q, v, np.zeros(simulator.nv), gravity, pairs)
     actual = simulator.acceleration(q, v)
     assert off(actual, expected.acceleration) <= 1e-9  # measured: 2.1e-15
-    begin, end, reach = simulator.memory.rows[: simulator.rows, -BOUNDS:].T
+    begin, end, first, reach = simulator.memory.rows[: simulator.rows, -BOUNDS:].T
     assert np.max(end - begin) == (9 if far else 3)
     assert np.max(reach - np.arange(simulator.rows)) == (19 if far else 6)
+    assert np.max(np.arange(simulator.rows) - first) == (18 if far else 5)

@@ -131,7 +131,8 @@ def _stage_state(theta_rate: Array, vdot: Array, stage: int, v: Array, h: float,
     clear(theta)
     copy(v, middle)
     for j in range(stage):
-        weight = h * A[stage, j]
+        weight, turned, gained = h * A[stage, j], theta_rate[j], vdot[j]
         if weight != 0.0:
-            accumulate(weight, theta_rate[j], theta)
-            accumulate(weight, vdot[j], middle)
+            for k in range(v.shape[0]):
+                theta[k] += weight * turned[k]
+                middle[k] += weight * gained[k]

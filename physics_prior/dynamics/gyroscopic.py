@@ -26,9 +26,7 @@ from physics_prior.dynamics.records import FREE, SPHERICAL
 from physics_prior.dynamics.types import Matrix, Record, Records, Symmetric, Vector
 
 NEWTON_ITERATIONS = 20
-NEWTON_TOLERANCE = (
-    1e-24  # of the square of the angular velocity: what the next change would be, at the rate of the last
-)
+NEWTON_TOLERANCE = 1e-30  # of the squared angular velocity: what the next change would be, at the rate of the last
 
 
 @inline_kernel

@@ -18,7 +18,7 @@ ROOMS = [
     ("inertia",),
     ("model",),
     ("dynamics.kernel", "dynamics.kernel_compiler", "dynamics.types", "dynamics.algebra", "dynamics.spatial")
-    + ("dynamics.rotation_vector", "dynamics.point_force"),
+    + ("dynamics.trigonometry", "dynamics.rotation_vector", "dynamics.point_force"),
     ("effects",),
     ("dynamics",),
     ("scene",),

@@ -16,6 +16,8 @@ LEAST_NOISE = 1e-3  # m: cameras and labels leave as much
 UNKNOWN = 15.0  # rad/s^2 sqrt(s) and m/s^2 sqrt(s): accelerations by what is not modelled, muscles first of all
 BESIDE = 50.0  # rad/s^2 sqrt(s): accelerations of a joint by what is not modelled, where muscles are
 MUSCLE = 3000.0  # rad/s^3 sqrt(s): jerk of a joint by its muscles
+CALM = ("neck", "shoulder", "elbow", "radioulnar", "wrist")  # joints that no landing foot shakes
+CALM_BESIDE, CALM_MUSCLE = 5.0, 100.0  # of these
 CONSTANT = 1.0  # s, over which torques of muscles and forces of the ground are forgotten
 VERTICAL, HORIZONTAL, MOMENT = 1.0, 0.2, 0.08  # of the ground's force, of the weight; of its moment, m of the weight
 TONE = 10.0  # 1/s: what joints that no marker tells come to rest by
@@ -99,6 +101,14 @@ def _damping(found: Calibration, ease: np.ndarray) -> str:
     return "\n".join(f"        {link.joint.name}: {TONE / np.median(ease[link.v]):.2g}" for link in joints)
 
 
+def _calm(found: Calibration) -> np.ndarray:
+    """(nv,) bool: freedoms of joints that no landing foot shakes."""
+    out = np.zeros(found.human.tree().nv, dtype=bool)
+    for link in found.human.tree().links:
+        out[link.v] = any(name in link.joint.name for name in CALM)
+    return out
+
+
 def _by_joint(found: Calibration, values: np.ndarray, indent: int) -> str:
     """A line for each inner joint with its own of values (nv,)."""
     lines = []
@@ -110,11 +120,12 @@ def _by_joint(found: Calibration, values: np.ndarray, indent: int) -> str:
 
 
 def _unknown(found: Calibration, ease: np.ndarray) -> str:
+    jerks = np.where(_calm(found), CALM_MUSCLE, MUSCLE)
     return f"""  - muscle:
-      # jerks of {MUSCLE:g} rad/s^3 sqrt(s) of each joint by itself
+      # jerks of {MUSCLE:g} rad/s^3 sqrt(s) of each joint by itself, of {CALM_MUSCLE:g} in neck and arms
       time_constant: {CONSTANT:g} s
       strength:
-{_by_joint(found, MUSCLE * math.sqrt(0.5 * CONSTANT) / ease, 8)}
+{_by_joint(found, jerks * math.sqrt(0.5 * CONSTANT) / ease, 8)}
 {_feet(found)}
 """
 
@@ -122,13 +133,16 @@ def _unknown(found: Calibration, ease: np.ndarray) -> str:
 def _white(found: Calibration, ease: np.ndarray, forces: bool) -> str:
     root = found.human.tree().links[0]
     if forces:
-        text = f"{BESIDE:g} rad/s^2 sqrt(s) of each joint by itself; nothing holds the whole but the ground"
-        own = "0"
+        text = (
+            f"{BESIDE:g} rad/s^2 sqrt(s) of each joint by itself, of {CALM_BESIDE:g} in neck and arms;"
+            " nothing holds the whole but the ground"
+        )
+        own, accelerations = "0", np.where(_calm(found), CALM_BESIDE, BESIDE)
     else:
         text = f"{UNKNOWN:g} rad/s^2 sqrt(s), or m/s^2 sqrt(s), of each joint by itself"
         linear, angular = (UNKNOWN / ease[root.v])[[0, 4]]
-        own = f"{{linear: {linear:.2g}, angular: {angular:.2g}}}"
-    lines = _by_joint(found, (BESIDE if forces else UNKNOWN) / ease, 4)
+        own, accelerations = f"{{linear: {linear:.2g}, angular: {angular:.2g}}}", np.full(len(ease), UNKNOWN)
+    lines = _by_joint(found, accelerations / ease, 4)
     return f"  # unknown accelerations of {text}\n  force:\n    {root.joint.name}: {own}\n{lines}"
 
 

@@ -17,7 +17,7 @@ from physics_prior.dynamics.covariance import add_rows
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.dynamics.types import Array
-from physics_prior.estimation import ground
+from physics_prior.estimation import ground, stance
 from physics_prior.estimation.process import OnManifold, State, WhiteForces
 from physics_prior.scene import Scene
 
@@ -90,6 +90,7 @@ class ForcedProcess(OnManifold):
 
     def predict(self, state: State, factor: np.ndarray, h: float, count: int) -> np.ndarray:
         factor = super().predict(state, factor, h, count)
+        factor = stance.keep_still(self, state, factor, h * count)
         self.admit(state, factor)
         return factor
 

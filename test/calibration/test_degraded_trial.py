@@ -48,10 +48,9 @@ def noisier(scene: Scene) -> Scene:
     return replace(scene, measurements=(source.model_copy(update={"markers": tuple(markers)}),))
 
 
-@pytest.mark.slow
-def test_a_bad_day_does_not_lose_the_walker():
-    """Gaps are bridged, and innovations are as large as expected of the noise, gated ones left out."""
-    scene = load_scene("walk_lemouel_tracking")
+def bad_day(name: str) -> tuple[int, set[Level], float, float, int]:
+    """Of a scene in the degraded trial: starts, healths, error of markers in gaps (m), NIS a row, and how many rows."""
+    scene = load_scene(name)
     frames = read_measurements(BAG, scene)
     bad, lost = degraded(frames, np.random.default_rng(6))
     estimator = Estimator(noisier(scene))
@@ -65,11 +64,30 @@ def test_a_bad_day_does_not_lose_the_walker():
             levels.add(estimator.health_of(posterior, frame.stamp).level)
             errors.append(estimator.filter.innovation(true, posterior.state).y.reshape(-1, 3)[gone])
     estimator.reset()
-    assert levels == {Level.OK}
-    assert sum(node.posterior.start for node in nodes) == 1  # never started anew
-    assert np.sqrt(np.mean(np.sum(np.concatenate(errors) ** 2, axis=1))) < 0.025  # measured: 8.1 mm
     used = [node.posterior for node in nodes if node.posterior.used]
-    ratio = sum(each.nis for each in used) / sum(each.dimension for each in used)
-    # what passes the gate of 0.999 has a mean of 0.995 of what all had; the 95 % band of as many rows. Measured: 0.990
     rows = sum(each.dimension for each in used)
-    assert ratio == pytest.approx(chi2.cdf(GATE, 5) / chi2.cdf(GATE, 3), abs=1.96 * np.sqrt(2.0 / rows))
+    error = float(np.sqrt(np.mean(np.sum(np.concatenate(errors) ** 2, axis=1))))
+    return sum(node.posterior.start for node in nodes), levels, error, sum(each.nis for each in used) / rows, rows
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "conservative"),
+    [
+        ("walk_lemouel_tracking", False),  # measured: 8.1 mm, 0.990
+        ("walk_lemouel", True),  # 24.0 mm, 0.971; of seeds 1 to 4 14.2 to 21.8 mm, 0.965 to 0.975
+    ],
+)
+def test_a_bad_day_does_not_lose_the_walker(name, conservative):
+    """Gaps are bridged, and innovations are as large as expected of the noise, gated ones left out.
+
+    With forces they are smaller, which is safe and not what is wanted: what skin does while one stands still is in the noise.
+    """
+    starts, levels, error, ratio, rows = bad_day(name)
+    assert starts == 1  # never started anew
+    assert levels == {Level.OK}
+    assert error < 0.025
+    # what passes the gate of 0.999 has a mean of 0.995 of what all had; the 95 % band of as many rows
+    expected, band = chi2.cdf(GATE, 5) / chi2.cdf(GATE, 3), 1.96 * np.sqrt(2.0 / rows)
+    assert ratio <= expected + band
+    assert conservative or ratio >= expected - band

@@ -203,18 +203,6 @@ def simulated(tmp_path_factory):
 def test_one_core_two_doors_on_a_simulated_bag(simulated, tmp_path):
     expected = replayed(simulated, tmp_path / "out", 10.0)
     said = live(simulated, 10.0, "each", expected)
-    for t in TOPICS:
-        print(
-            "DIFF",
-            t,
-            len(said[t]),
-            len(expected[t]),
-            [i for i, s in enumerate(expected[t]) if said[t].get(s) != expected[t][s]][:10],
-        )
-    print(
-        decode(TOPICS["joint_states"].ros_type, list(said["joint_states"].values())[-1]),
-        decode(TOPICS["joint_states"].ros_type, list(expected["joint_states"].values())[-1]),
-    )
     assert said == expected
     assert len(said["joint_states"]) == 150  # 151 moments, of which the first only tells where the start is
 

@@ -22,9 +22,7 @@ from physics_prior.estimation.process import State
 if TYPE_CHECKING:
     from physics_prior.estimation.forced_process import ForcedProcess
 
-STILL = (
-    0.055  # m/s sqrt(s): of a corner on the ground under the whole weight; over 0.1 s it goes with it within 0.17 m/s
-)
+STILL = 0.055  # m/s sqrt(s): of a corner on the ground under the whole weight; 0.17 m/s over 0.1 s
 ROLLING = 0.02  # m: a corner so far from the ground has twice that
 
 

@@ -349,7 +349,7 @@ def test_bench_prints_or_files_what_the_study_measured(capsys, monkeypatch, tmp_
     assert (code, err) == (0, "")
     assert "forward dynamics" in out
     figures = json.loads((tmp_path / "bench.json").read_text())
-    assert set(figures) == {"ratios", "us", "machine"}
+    assert set(figures) == {"ratios", "us", "real_time", "machine"}
     code, out, _ = run(capsys, "bench", "--json", "-")
     assert set(json.loads(out)) == set(figures)
 

@@ -169,10 +169,11 @@ class Filter:
         for _ in range(ITERATIONS - 1 if gain.largest >= SMALL_CORRECTION else 0):
             seen = self.innovation(measurement, state)
             seen = seen.kept(believed) if partly else seen
-            from_prior = self.process.difference(prior.state, state)
-            last = gain_of(U, replace(seen, y=seen.y + seen.H @ from_prior[: seen.H.shape[1]]))
+            from_prior = self.process.difference(prior.state, state)[: seen.H.shape[1]]
+            last = gain_of(U, replace(seen, y=seen.y + seen.H @ from_prior))
             state = self.process.displace(prior.state, last.correction)
-            if np.max(np.abs(last.correction - from_prior)) < 1e-3 * SMALL_CORRECTION:
+            # of what is seen: the rest, rates and forces, goes with it
+            if np.max(np.abs(last.correction[: len(from_prior)] - from_prior)) < 1e-3 * SMALL_CORRECTION:
                 break
         state, factor = self.process.settle(state, last.factor)
         self.constrain(state, factor)

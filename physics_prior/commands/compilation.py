@@ -11,7 +11,7 @@ from physics_prior.dynamics.kernel import cache_directory
 from physics_prior.scene import Scene, load_scene
 from physics_prior.stepping import Choice, settle
 
-DURATION, WITH_CONTACT = "~15 s", "~40 s"
+DURATION, WITH_CONTACT = "~20 s", "~40 s"
 
 
 def load_settled(name_or_path: str | Path) -> tuple[Scene, Choice | None]:

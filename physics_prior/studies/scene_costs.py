@@ -19,7 +19,7 @@ from physics_prior.interface.warm_up import warm_up
 from physics_prior.scene import load_scene
 from physics_prior.studies.effects.cost import step_times
 
-SCENES = ("free_body", "double_pendulum", "walk_lemouel_tracking")
+SCENES = ("free_body", "double_pendulum", "walk_lemouel")
 
 
 def run_scene_costs(progress: Callable[[float, str], None] = lambda done, what: None) -> dict[str, Any]:

@@ -72,16 +72,16 @@ def bad_day(name: str) -> tuple[int, set[Level], float, float, int]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "conservative"),
+    ("name", "slack"),
     [
-        ("walk_lemouel_tracking", False),  # measured: 8.1 mm, 0.990
-        ("walk_lemouel", True),  # 24.0 mm, 0.971; of seeds 1 to 4 14.2 to 21.8 mm, 0.965 to 0.975
+        ("walk_lemouel_tracking", 0.0),  # measured: 8.1 mm, 0.990
+        ("walk_lemouel", 0.02),  # 24.0 mm, 0.971; of seeds 1 to 4 14.2 to 21.8 mm, 0.965 to 0.975
     ],
 )
-def test_a_bad_day_does_not_lose_the_walker(name, conservative):
+def test_a_bad_day_does_not_lose_the_walker(name, slack):
     """Gaps are bridged, and innovations are as large as expected of the noise, gated ones left out.
 
-    With forces they are smaller, which is safe and not what is wanted: what skin does while one stands still is in the noise.
+    With forces they are smaller, by a slack that is not wanted: what skin does while one stands still is in the noise.
     """
     starts, levels, error, ratio, rows = bad_day(name)
     assert starts == 1  # never started anew
@@ -89,5 +89,4 @@ def test_a_bad_day_does_not_lose_the_walker(name, conservative):
     assert error < 0.025
     # what passes the gate of 0.999 has a mean of 0.995 of what all had; the 95 % band of as many rows
     expected, band = chi2.cdf(GATE, 5) / chi2.cdf(GATE, 3), 1.96 * np.sqrt(2.0 / rows)
-    assert ratio <= expected + band
-    assert conservative or ratio >= expected - band
+    assert expected - band - slack <= ratio <= expected + band

@@ -10,6 +10,8 @@ from physics_prior.errors import SimulationError
 if TYPE_CHECKING:
     from physics_prior.dynamics.simulator import Simulator
 
+REVOLUTION, FAR = 2.0 * np.pi, 1e4  # rad and m that a step may turn and slide
+
 
 def failure(simulator: "Simulator", rank: int, h: float) -> SimulationError:
     """The error of a step of h seconds that returned a negative rank (step.py)."""
@@ -34,4 +36,23 @@ def require_finite(simulator: "Simulator", vdot: np.ndarray) -> None:
         raise SimulationError(
             f"the acceleration of '{simulator.tree.freedom_names[int(np.argmin(finite))]}' is not finite: the state is not,"
             " or a joint carries no inertia in this posture (a straight chain of thin rods)"
+        )
+
+
+def require_followed(simulator: "Simulator", v: np.ndarray, h: float) -> None:
+    """Raise SimulationError if a motion v (nv,) is too fast for steps of h seconds to have followed it.
+
+    No integrator follows more than a turn a step. One whose step is too large for its stiffness may come through all numbers
+    up to 1e94 and back, the covariance with it, so that measurements seem to fit.
+    """
+    if np.max(np.abs(v), initial=0.0) * h <= REVOLUTION:  # nearly always
+        return
+    turning = simulator.tree.turning
+    share = np.abs(v) * h / np.where(turning, REVOLUTION, FAR)
+    worst = int(np.argmax(share))
+    if share[worst] > 1.0:
+        does, unit, most = ("turns", "rad", "one revolution") if turning[worst] else ("slides", "m", f"{FAR:g} m")
+        raise SimulationError(
+            f"'{simulator.tree.freedom_names[worst]}' {does} by {abs(v[worst]) * h:.3g} {unit} in a step of {h:g} s, more than"
+            f" {most}: a smaller step size or another integrator may do"
         )

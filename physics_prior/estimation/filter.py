@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from physics_prior.dynamics.contact.impulse import push_out
+from physics_prior.dynamics.failure import require_followed
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.dynamics.switches import Hold
 from physics_prior.errors import MeasurementError
@@ -76,7 +77,7 @@ class Filter:
         self._limits: dict[int, float] = {}
 
     def predict(self, posterior: Posterior, stamp: int) -> Posterior:
-        """The posterior carried to a later stamp, ns; SimulationError if the motion leaves the numbers."""
+        """The posterior carried to a later stamp, ns; SimulationError if it leaves the numbers or is too fast to follow."""
         if stamp <= posterior.stamp:
             return posterior
         begun = posterior.begun
@@ -92,6 +93,7 @@ class Filter:
         count, h = steps((stamp - posterior.stamp) * 1e-9, self.scene.step.size)
         state = posterior.state.copy()
         factor = self.process.predict(state, posterior.factor, h, count)
+        require_followed(self.simulator, state.v, h)
         return replace(self._fresh(posterior), stamp=stamp, state=state, factor=factor)
 
     @staticmethod

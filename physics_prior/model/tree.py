@@ -143,6 +143,14 @@ class Tree:
                 names.append(link.joint.name)
         return names
 
+    @property
+    def turning(self) -> np.ndarray:
+        """(nv,) bool, which degrees of freedom turn; the others slide."""
+        kinds = {JointKind.FREE: [False] * 3 + [True] * 3, JointKind.PRISMATIC: [False]}
+        return np.array(
+            [each for link in self.links for each in kinds.get(link.joint.kind, [True] * link.joint.nv)], bool
+        )
+
     def neutral(self) -> np.ndarray:
         """(nq,) all coordinates zero, quaternions one."""
         q = np.zeros(self.nq)

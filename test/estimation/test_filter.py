@@ -1,5 +1,6 @@
 """One prediction, one gate, one update."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -48,6 +49,27 @@ def test_a_prediction_that_leaves_the_numbers_is_not_passed_on(shipped, filter_o
     before.state.v[:] = 1e200
     with pytest.raises(SimulationError, match="not finite"):
         filter.predict(before, NANOSECONDS)
+
+
+@pytest.mark.parametrize(
+    ("freedom", "of_most", "says"),
+    [
+        (0, 0.9, None),
+        (0, 1.1, "'box/linear_x' slides by 1.1e+04 m in a step of 0.005 s, more than 10000 m: a smaller step"),
+        (4, 0.9, None),
+        (4, 1.1, "'box/angular_y' turns by 6.91 rad in a step of 0.005 s, more than one revolution: a smaller step"),
+    ],
+)
+def test_a_prediction_faster_than_its_steps_can_follow_is_not_passed_on(shipped, filter_of, freedom, of_most, says):
+    filter = filter_of(shipped("free_body"))
+    before = _posterior(filter)
+    h = filter.scene.step.size
+    before.state.v[freedom] = of_most * (2.0 * np.pi if freedom > 2 else 1e4) / h
+    if says is None:
+        filter.predict(before, round(h * NANOSECONDS))
+        return
+    with pytest.raises(SimulationError, match=re.escape(says)):
+        filter.predict(before, round(h * NANOSECONDS))
 
 
 @pytest.mark.parametrize("name", ["double_pendulum", "free_body"])

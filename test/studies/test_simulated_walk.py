@@ -35,6 +35,23 @@ def cycle(walk):
     return [(time, walk.at(time)) for time in CYCLE * np.arange(48) / 48]
 
 
+def test_steps_too_large_for_the_muscles_are_refused_by_name_and_no_estimate_runs_away(walk):
+    scene = load_scene("simulated_walk")
+    scene = replace(scene, step=scene.step.model_copy(update={"size": 0.01}))  # its own is 5 ms; q was 4e49, v 5e94
+    estimator, told = Estimator(scene), []
+    for _, _, measurements in moments(scene, walk, 0, 0.7):
+        for each in measurements:
+            before = estimator.last_rejection
+            estimator.add(each)
+            if estimator.last_rejection != before:
+                told.append(estimator.last_rejection)
+            if estimator.ready:
+                estimate = estimator.estimate()
+                assert np.max(np.abs(estimate.q)) < 1e3  # 23 [m, rad]
+                assert np.max(np.abs(estimate.v)) < 1e4  # 364
+    assert any("in a step of 0.01 s, more than one revolution" in each for each in told)
+
+
 def pressure(wrench):
     return np.array([-wrench[4], wrench[3]]) / wrench[2]
 

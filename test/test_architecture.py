@@ -17,7 +17,14 @@ ROOMS = [
     ("errors", "resources", "rotations"),
     ("inertia",),
     ("model",),
-    ("dynamics.kernel", "dynamics.kernel_compiler", "dynamics.types", "dynamics.algebra", "dynamics.spatial")
+    (
+        "dynamics.kernel",
+        "dynamics.kernel_cache",
+        "dynamics.kernel_compiler",
+        "dynamics.types",
+        "dynamics.algebra",
+        "dynamics.spatial",
+    )
     + ("dynamics.trigonometry", "dynamics.rotation_vector", "dynamics.point_force"),
     ("effects",),
     ("dynamics",),

@@ -7,7 +7,7 @@ from typing import Literal
 
 from physics_prior.commands.terminal import progress, status
 from physics_prior.dynamics.compose import kinds_of_rows, step_module
-from physics_prior.dynamics.kernel import cache_directory
+from physics_prior.dynamics.kernel_cache import cache_directory
 from physics_prior.scene import Scene, load_scene
 from physics_prior.stepping import Choice, settle
 

@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from physics_prior.effects.holding import Holding
 from physics_prior.errors import SimulationError
@@ -97,6 +96,8 @@ def _turn_back(simulator: "Simulator", q: np.ndarray, index: int) -> None:
     for _ in range(STEPS):
         simulator.constraint_error(q, still)
         a, b = (pairs[name][first + 1 : last] - pairs[name][first] for name in ("a", "b"))
+        from scipy.spatial.transform import Rotation  # here: few need it, and it takes long to load
+
         turn = Rotation.align_vectors(a, b)[0].as_rotvec()
         angle = float(np.linalg.norm(turn))
         if angle < NEAR:

@@ -23,7 +23,8 @@ from numba.core.errors import NumbaError
 
 from physics_prior.dynamics.derivatives import COMPOSITE, FREEDOM
 from physics_prior.dynamics.integrators import INTEGRATORS, IntegratorName
-from physics_prior.dynamics.kernel import cache_directory, inline_kernel, sources_digest
+from physics_prior.dynamics.kernel import inline_kernel
+from physics_prior.dynamics.kernel_cache import cache_directory, sources_digest
 from physics_prior.dynamics.records import LINK, WORK
 from physics_prior.dynamics.types import Array
 from physics_prior.effects.effect import Effect

@@ -6,16 +6,19 @@ machine code, once, with all that they call. Dispatchers, passes and code librar
 """
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any, ClassVar, cast
 
 import llvmlite.binding as llvm
 from numba.core import typed_passes, types, untyped_passes
-from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, CompileResult, compile_result
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.environment import lookup_environment
 from numba.core.registry import CPUDispatcher
+
+from physics_prior.dynamics.kernel_cache import KernelCache
 
 
 class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc]
@@ -143,7 +146,7 @@ class _EntryPipeline(_Pipeline):
     lowering = _EntryLowering
 
 
-class _InnerResult(CompileResultCacheImpl):  # type: ignore[misc]
+class _InnerResult(KernelCache):
     """How an inner edition is kept on disk: its code with what it calls, and its types."""
 
     def get_filename_base(self, fullname: str, abiflags: str) -> str:
@@ -171,6 +174,10 @@ class _InnerResult(CompileResultCacheImpl):  # type: ignore[misc]
         )
 
 
+class _EntryCache(FunctionCache):  # type: ignore[misc]
+    _impl_class = KernelCache
+
+
 class _InnerCache(FunctionCache):  # type: ignore[misc]
     _impl_class = _InnerResult
 
@@ -178,8 +185,9 @@ class _InnerCache(FunctionCache):  # type: ignore[misc]
 class _Inner(CPUDispatcher):  # type: ignore[misc]
     """The edition for other kernels."""
 
-    def enable_caching(self) -> None:
-        self._cache = _InnerCache(self.py_func)
+    def __init__(self, function: Callable[..., Any], **settings: Any) -> None:
+        super().__init__(function, **settings)
+        self._cache = _InnerCache(function)
 
     def add_overload(self, result: CompileResult) -> None:
         # but not with the dispatcher in C, which serves calls from Python
@@ -192,10 +200,13 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         options = {"nopython": True, "no_cfunc_wrapper": True, **options}  # nobody calls a kernel through C
         super().__init__(function, targetoptions=options, pipeline_class=_EntryPipeline)
-        options = {**options, "no_cpython_wrapper": True}
-        self._inner = _Inner(function, targetoptions=options, pipeline_class=_InnerPipeline)
-        for edition in (self, self._inner):
-            edition.enable_caching()
+        self._cache = _EntryCache(function)
+
+    @cached_property
+    def _inner(self) -> _Inner:
+        """Made when a kernel that calls this one is compiled."""
+        options = {**self.targetoptions, "no_cpython_wrapper": True}
+        return _Inner(self.py_func, targetoptions=options, pipeline_class=_InnerPipeline)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """What the type inference of a kernel that calls this one asks."""

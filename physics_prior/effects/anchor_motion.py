@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
-from scipy.interpolate import CubicSpline
 
 Vector = tuple[float, float, float]
 FOR_EVER = 1e12  # s: no scene lasts longer
@@ -63,6 +62,8 @@ class AnchorMotion(BaseModel):
             omega = 2.0 * math.pi * self.sine.frequency
             return np.array([0.0, omega, self.sine.phase, *(R @ np.array(self.sine.amplitude))])
         if self.keyframes is not None:
+            from scipy.interpolate import CubicSpline  # here: it takes longer to load than all else of an effect
+
             spline = CubicSpline(self.keyframes.times, np.array(self.keyframes.positions), bc_type="clamped")
             times, coefficients = spline.x, spline.c[::-1].transpose(1, 0, 2)
         else:

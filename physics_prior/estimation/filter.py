@@ -7,14 +7,13 @@ will, and the same measurements give the same numbers in whatever order they cam
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from physics_prior.dynamics.contact.impulse import push_out
 from physics_prior.dynamics.failure import require_followed
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.dynamics.switches import Hold
 from physics_prior.errors import MeasurementError
-from physics_prior.estimation import switching
+from physics_prior.estimation import chi_squared, switching
 from physics_prior.estimation.gain import gain_of
 from physics_prior.estimation.measurement import ForceMeasurement, Measurement, SwitchCommand, command_topic
 from physics_prior.estimation.observation import Innovation, check, innovation
@@ -132,7 +131,7 @@ class Filter:
     def gate_limit(self, dimension: int) -> float:
         """The normalised innovation squared that a measurement of this dimension may have."""
         if dimension not in self._limits:
-            self._limits[dimension] = float(chi2.ppf(self.scene.gate.probability, dimension))
+            self._limits[dimension] = float(chi_squared.quantile(self.scene.gate.probability, dimension))
         return self._limits[dimension]
 
     def update(self, prior: Posterior, measurement: Measurement, gated: bool = True) -> Posterior:

@@ -4,10 +4,10 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 from scipy import constants
-from scipy.stats import chi2
 
 from physics_prior import rotations
 from physics_prior.dynamics.simulator import Simulator
+from physics_prior.estimation import chi_squared
 from physics_prior.estimation.estimate import Estimate
 from physics_prior.interface.geometry import point_of, pose_of, vector_of
 from physics_prior.model import Part, Tree
@@ -16,7 +16,7 @@ from physics_prior.recording.messages import ColorRGBA, Header, Marker, MarkerAr
 SHAFT, HEAD, DOT = 0.04, 0.1, 0.08  # diameters of an arrow and of a point of contact, of the size of the model
 LEAST_ARROW, LEAST_AXIS = 1e-3, 1e-3  # drawn: of the size of the model
 PROBABILITY = 0.95  # that the true point is inside its ellipsoid
-RADIUS = float(np.sqrt(chi2.ppf(PROBABILITY, 3)))  # in standard deviations
+RADIUS = float(np.sqrt(chi_squared.quantile(PROBABILITY, 3)))  # in standard deviations
 
 PART_COLOR = ColorRGBA(0.55, 0.65, 0.8, 1.0)
 FORCE_COLOR = ColorRGBA(0.85, 0.2, 0.15, 1.0)

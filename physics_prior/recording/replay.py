@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
 
 from physics_prior.errors import RecordingError
+from physics_prior.estimation import chi_squared
 from physics_prior.estimation.estimate import Counts, Estimate, Health, Level
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.estimation.filter import Posterior
@@ -98,7 +98,7 @@ class ReplayResult:
         mean = expected = low = high = None
         if len(nis):
             mean, expected = float(nis.mean()), float(dimension.mean())
-            low, high = (float(bound) / len(nis) for bound in chi2.interval(BAND, float(dimension.sum())))
+            low, high = (float(bound) / len(nis) for bound in chi_squared.interval(BAND, float(dimension.sum())))
         return {
             "lag_s": None if math.isinf(self.lag) else self.lag,
             "measurements": dict(vars(self.counts)),

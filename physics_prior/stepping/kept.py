@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from physics_prior.dynamics.compose import kinds_of_rows, step_source
 from physics_prior.dynamics.integrators import DEFAULT
-from physics_prior.dynamics.kernel import cache_directory
+from physics_prior.dynamics.kernel_cache import cache_directory
 from physics_prior.dynamics.records import link_records, pair_records
 from physics_prior.scene import Scene
 from physics_prior.stepping.choice import Choice

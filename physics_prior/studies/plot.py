@@ -14,9 +14,9 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from scipy.stats import chi2
 
 from physics_prior.errors import PhysicsPriorError
+from physics_prior.estimation import chi_squared
 from physics_prior.estimation.estimate import Level
 from physics_prior.recording.replay import BAND, ReplayResult
 
@@ -155,7 +155,7 @@ def _innovations(result: ReplayResult, axes: Axes) -> None:
         last = np.searchsorted(stamps, stamps + 0.5 * WINDOW, side="right")
         total, freedom = (np.concatenate([[0.0], np.cumsum(each)]) for each in (nis, dimension))
         window = freedom[last] - freedom[first]
-        low, high = chi2.interval(BAND, window[thin])
+        low, high = chi_squared.interval(BAND, window[thin])
         at = stamps[thin]
         axes.plot(at, (nis / dimension)[thin], ".", ms=2, color=LINES[0], alpha=0.25, label="each measurement")
         axes.fill_between(

@@ -12,7 +12,8 @@ from numba.core.errors import TypingError
 
 from physics_prior.dynamics.compose import GRAVITY, pack_parameters, step_module, step_source
 from physics_prior.dynamics.integrators import INTEGRATORS
-from physics_prior.dynamics.kernel import cache_directory, kernel
+from physics_prior.dynamics.kernel import kernel
+from physics_prior.dynamics.kernel_cache import cache_directory
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects.attachment import Attachment
 from physics_prior.effects.gravity import Gravity
@@ -155,7 +156,7 @@ def test_cache_is_keyed_by_the_kernels_sources(monkeypatch, tmp_path):
 
 def test_garbage_collector_rests_while_kernels_compile_and_works_again_after_failures(monkeypatch, tmp_path):
     """In an empty cache: what an earlier run left in the usual one would be loaded and not compiled."""
-    monkeypatch.setattr("physics_prior.dynamics.kernel.cache_directory", lambda: tmp_path)
+    monkeypatch.setattr("physics_prior.dynamics.kernel_cache.cache_directory", lambda: tmp_path)
     seen = []
 
     class Look(event.Listener):

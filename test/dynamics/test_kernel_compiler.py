@@ -1,9 +1,14 @@
 """Kernels have two editions: the one that kernels take in is never made machine code, and gives the bits of the other."""
 
+import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+from physics_prior.dynamics import algebra
 
 KERNELS = '''
 import math
@@ -76,3 +81,20 @@ def test_errors_and_words_of_kernels_taken_in_come_out(use):
     use("total(np.ones(1))")  # what twice takes in comes from the cache, in part
     assert use(caller).splitlines() == ["total 1.0", "2.0", "root of a negative number"]
     assert use("print(total(np.ones(3)))").splitlines() == ["total 1.0", "1.0"]
+
+
+def test_another_checkout_of_the_same_sources_finds_what_is_compiled(tmp_path):
+    package = Path(algebra.__file__).parents[1]
+    shutil.copytree(package, tmp_path / "physics_prior")
+    ask = "from physics_prior.dynamics import algebra; print(algebra.product._cache.cache_path, algebra.__file__)"
+    ran = subprocess.run(
+        [sys.executable, "-c", ask],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
+    )
+    folder, file = ran.stdout.split()
+    assert Path(file).is_relative_to(tmp_path)
+    assert folder == algebra.product._cache.cache_path

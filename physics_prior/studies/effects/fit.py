@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from physics_prior.errors import SceneError, SimulationError
 from physics_prior.studies.effects.likelihood import Likelihood, Recordings, likelihood
@@ -79,7 +79,7 @@ class Fit:
         problem, x = self.problem, self.minimum.x
         if not len(x):
             return []
-        z = float(norm.ppf(0.5 + 0.5 * CONFIDENCE))
+        z = float(ndtri(0.5 + 0.5 * CONFIDENCE))
         halves, errors = np.full(len(x), math.inf), np.full(len(x), math.nan)
         for wider in WIDER:
             widths = wider * self.minimum.widths

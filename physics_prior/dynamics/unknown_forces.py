@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from physics_prior.dynamics.compose import GRAVITY
+from physics_prior.dynamics.sole import SOLE, sole_record
 from physics_prior.effects.effect import Effect
 from physics_prior.effects.unknown_force import Sole, check_together
 from physics_prior.model import Tree
@@ -29,7 +30,7 @@ class UnknownForces:
 
     Attributes:
         deviation, time_constant: (count,) of each; places: (count,) where in the parameters it is.
-        feet: the soles, whose six forces each are a wrench, force first, world axes.
+        feet: the soles, whose six forces each are a wrench, force first, world axes; soles (feet,) SOLE: what kernels read.
         torques, freedoms: which forces act in joints, and on which degrees of freedom.
 
     Raises:
@@ -55,6 +56,8 @@ class UnknownForces:
                 self.feet.append(Foot(effect.label, force.sole, slice(self.count, self.count + size)))
             self.count += size
         self.places = np.concatenate(places)
+        records = [sole_record(tree, foot.sole, foot.span.start) for foot in self.feet]
+        self.soles = np.concatenate([np.zeros(0, SOLE), *records])
         self.deviation, self.time_constant = np.concatenate(deviation), np.concatenate(constants)
         of_all = np.concatenate([np.zeros(0, dtype=int), *freedoms])
         self.torques = np.flatnonzero(of_all >= 0)

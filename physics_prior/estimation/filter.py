@@ -16,7 +16,7 @@ from physics_prior.errors import MeasurementError
 from physics_prior.estimation import chi_squared, switching
 from physics_prior.estimation.gain import gain_of
 from physics_prior.estimation.measurement import ForceMeasurement, Measurement, SwitchCommand, command_topic
-from physics_prior.estimation.observation import Innovation, check, innovation
+from physics_prior.estimation.observation import OBSERVERS, Innovation, Observer, check
 from physics_prior.estimation.process import Process, State, steps
 from physics_prior.scene import MeasurementSource, Scene
 
@@ -70,6 +70,11 @@ class Filter:
     def __init__(self, scene: Scene, simulator: Simulator, process: Process) -> None:
         self.scene, self.simulator, self.process = scene, simulator, process
         self.sources: dict[str, MeasurementSource] = {source.topic: source for source in scene.measurements}
+        self._observers: dict[str, Observer] = {
+            source.topic: OBSERVERS[type(source)](source, simulator)
+            for source in scene.measurements
+            if type(source) in OBSERVERS
+        }
         labels = simulator.switches.labels
         commands = {command_topic(label): index - len(labels) for index, label in enumerate(labels)}
         self.order = commands | {topic: index for index, topic in enumerate(self.sources)}
@@ -126,7 +131,7 @@ class Filter:
     def innovation(self, measurement: Measurement, state: State) -> Innovation:
         """The measurement, which must fit its source, against a state."""
         self.simulator.move(state.q, state.v)
-        return innovation(self.sources[measurement.topic], measurement, self.simulator, state.q)
+        return self._observers[measurement.topic].innovation(measurement, state.q)
 
     def gate_limit(self, dimension: int) -> float:
         """The normalised innovation squared that a measurement of this dimension may have."""
@@ -176,7 +181,7 @@ class Filter:
             # of what is seen: the rest, rates and forces, goes with it
             if np.max(np.abs(last.correction[: len(from_prior)] - from_prior)) < 1e-3 * SMALL_CORRECTION:
                 break
-        state, factor = self.process.settle(state, last.factor)
+        state, factor = self.process.settle(state, last.factor())
         self.constrain(state, factor)
         return Posterior(
             prior.stamp,

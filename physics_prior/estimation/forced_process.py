@@ -17,7 +17,7 @@ from physics_prior.dynamics.covariance import add_rows
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.dynamics.types import Array
-from physics_prior.estimation import ground, stance
+from physics_prior.estimation import bearing, ground, stance
 from physics_prior.estimation.process import OnManifold, State, WhiteForces
 from physics_prior.scene import Scene
 
@@ -44,7 +44,11 @@ class ForcedProcess(OnManifold):
         super().__init__(scene, simulator, 2 * simulator.nv + simulator.unknown.count)
         self.unknown, self.nv = simulator.unknown, simulator.nv
         self._white = WhiteForces(scene, simulator)
-        self._passive = np.setdiff1d(np.arange(self.nv), self.unknown.freedoms)
+        passive = np.setdiff1d(np.arange(self.nv), self.unknown.freedoms)
+        self._passive, self._root = passive, np.ix_(passive, passive)
+        self._held = np.ix_(self.unknown.freedoms, passive)
+        self._under_feet = np.concatenate([np.arange(0), *(np.r_[foot.span] for foot in self.unknown.feet)])
+        self._counter = np.ix_(self.unknown.torques, self._under_feet)
         gravity = simulator.memory.parameters[:GRAVITY]
         self._weight = simulator.tree.mass * float(np.linalg.norm(gravity))
         self.scale = max(self._weight, 1.0)
@@ -53,10 +57,9 @@ class ForcedProcess(OnManifold):
         force = np.zeros(self.unknown.count)
         state = State(q, v, np.zeros(0), force, np.zeros(len(self.unknown.feet), dtype=bool))
         self.simulator.move(q, v)
-        for index, foot in enumerate(self.unknown.feet):
-            state.grounded[index] = ground.stands(
-                self.simulator, foot, state, False, False, np.zeros((self.nv, 1)), 0.0
-            )
+        sure = np.zeros((self.n, 1))
+        for index in range(len(self.unknown.feet)):
+            state.grounded[index] = ground.stands(self, index, state, False, False, sure, 0.0)
         force[:] = self._mean(state)
         return state
 
@@ -107,7 +110,7 @@ class ForcedProcess(OnManifold):
         return ground.settle(self, state, factor)
 
     def admit(self, state: State, factor: np.ndarray) -> bool:
-        return ground.admit(self, state, factor)
+        return bearing.admit(self, state, factor)
 
     def _acting(self, state: State) -> np.ndarray:
         """(nf,) bool: which unknown forces there are; those of feet off the ground are not."""
@@ -126,13 +129,11 @@ class ForcedProcess(OnManifold):
 
     def _force_noise(self, state: State, M: np.ndarray, D: np.ndarray, h: float) -> np.ndarray:
         """(nf, nf) factor of the noise that a step of h seconds adds to the forces."""
-        own = self.unknown
-        noise = np.diag(own.deviation * np.sqrt(1.0 - np.exp(-2.0 * h / own.time_constant)))
-        noise *= self._acting(state)
+        own, feet = self.unknown, self._under_feet
+        deviation = own.deviation * np.sqrt(1.0 - np.exp(-2.0 * h / own.time_constant)) * self._acting(state)
+        noise = np.diag(deviation)
         if len(own.torques):
-            passive, held = self._passive, own.freedoms
-            for foot in own.feet:
-                pushed = D[:, foot.span] @ noise[foot.span, foot.span]
-                moved = np.linalg.solve(M[np.ix_(passive, passive)], pushed[passive])
-                noise[own.torques, foot.span] = M[np.ix_(held, passive)] @ moved - pushed[held]
+            pushed = D[:, feet] * deviation[feet]
+            moved = np.linalg.solve(M[self._root], pushed[self._passive])
+            noise[self._counter] = M[self._held] @ moved - pushed[own.freedoms]
         return noise

@@ -1,6 +1,7 @@
 """Measurements: what was seen, when, and how surely. Odd ones are refused where they are made."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -65,7 +66,7 @@ class PointsMeasurement(Measurement):
         _set(self, "points", points)
         _finite("points", points[self.seen], None)
 
-    @property
+    @cached_property
     def seen(self) -> np.ndarray:
         """Indices of the markers that were seen."""
         return np.flatnonzero(~np.isnan(self.points).any(axis=1))

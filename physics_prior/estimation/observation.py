@@ -1,7 +1,9 @@
 """Observation models: what a state lets a source see, how that depends on the state, and how noisy it is."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from physics_prior.dynamics.algebra import (
     transposed_times,
 )
 from physics_prior.dynamics.arrays import copy
+from physics_prior.dynamics.covariance import triangularise
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kinematics import point_jacobian
 from physics_prior.dynamics.rotation_vector import vector_of
@@ -46,24 +49,26 @@ from physics_prior.scene import (
 
 @dataclass(frozen=True, eq=False)
 class Innovation:
-    """A measurement against a state: y ~ H dx + noise, dx the tangent of q.
+    """A measurement against a state: y ~ H dx + noise, dx the tangent of q or other errors in a row.
 
     Attributes:
         y: (m,) measured less expected.
-        H: (m, nv) derivative of what is expected by the tangent of q.
+        H: (m, h) derivative of what is expected by h errors of the state.
         noise: (m, m) lower factor of the measurement's covariance.
         block: how many rows are believed or refused together; the noise of such blocks is independent.
+        first: of these errors; that of q where left out.
     """
 
     y: np.ndarray
     H: np.ndarray
     noise: np.ndarray
     block: int
+    first: int = 0
 
     def kept(self, blocks: np.ndarray) -> "Innovation":
         """Only some of its blocks, (m / block,) of bool."""
         rows = np.repeat(blocks, self.block)
-        return Innovation(self.y[rows], self.H[rows], self.noise[np.ix_(rows, rows)], self.block)
+        return Innovation(self.y[rows], self.H[rows], self.noise[np.ix_(rows, rows)], self.block, self.first)
 
     @cached_property
     def whitened(self) -> tuple[np.ndarray, np.ndarray]:
@@ -74,9 +79,11 @@ class Innovation:
 
     def squares(self, U: np.ndarray) -> np.ndarray:
         """(m / block,) normalised innovation squared of each block alone; the state's covariance is U^T U, U (n, n)."""
-        out, n = np.empty(len(self.y) // self.block), len(U)
-        T, scratch = np.empty((self.block + n, self.block)), np.empty(n + 2 * self.block)
-        block_squares(*self.whitened, U, self.block, T, scratch, out)
+        out, h = np.empty(len(self.y) // self.block), self.H.shape[1]
+        own = np.array(U[:, self.first : self.first + h], order="C")
+        triangularise(own, h, np.empty(len(U) + h))
+        T, scratch = np.empty((self.block + h, self.block)), np.empty(h + 2 * self.block)
+        block_squares(*self.whitened, own[:h], self.block, T, scratch, out)
         return out
 
 
@@ -106,42 +113,107 @@ def check(source: MeasurementSource, measurement: Measurement) -> None:
                 raise MeasurementError(f"joint '{name}' is not one of the source's: {list(source.joints)}")
 
 
-def innovation(source: MeasurementSource, measurement: Measurement, simulator: Simulator, q: np.ndarray) -> Innovation:
-    """The innovation of a measurement at a configuration q (nq,); its kinematics must be up to date (``move``).
+class Observer(ABC):
+    """How a source sees the states of a simulator; what is the same for all measurements is found once."""
 
-    Rotations are compared in the tangent space of the expected one, log(R_expected^T R_measured), in the measured frame's
-    axes (Sola 2017, ch. 4). m may be 0, where no marker is seen. The measurement must fit its source (``check``).
-    """
-    if isinstance(source, PoseSource) and isinstance(measurement, PoseMeasurement):
-        y, H = _frame_seen(simulator, source, source.scale * measurement.position, measurement.orientation)
-        if measurement.covariance is not None:
-            to_metres = np.repeat([source.scale, 1.0], 3)
-            return Innovation(y, H, to_metres[:, None] * np.linalg.cholesky(measurement.covariance), 6)
-        return Innovation(y, H, _alike(3, source.position_noise, source.orientation_noise), 6)
-    if isinstance(source, OrientationSource) and isinstance(measurement, OrientationMeasurement):
-        y, H = _frame_seen(simulator, source, NOWHERE, measurement.orientation)
-        if measurement.covariance is not None:
-            return Innovation(y[3:], H[3:], np.linalg.cholesky(measurement.covariance), 3)
-        return Innovation(y[3:], H[3:], _alike(3, source.orientation_noise), 3)
-    if isinstance(source, PointsSource) and isinstance(measurement, PointsMeasurement):
-        seen = measurement.seen
-        y, H = np.empty(3 * len(seen)), np.empty((3 * len(seen), simulator.nv))
-        links, places = _markers(simulator, source)
-        scratch = np.empty((6, simulator.nv))
-        memory = simulator.memory
-        see_points(memory.links, memory.work, links[seen], places[seen], measurement.points[seen], y, H, scratch)
-        noise = tuple(source.markers[index].noise or source.noise for index in seen)
-        return Innovation(y, H, _alike(3, *noise), 3)
-    assert isinstance(source, JointSource)
-    assert isinstance(measurement, JointsMeasurement)
-    y, H = np.zeros(len(measurement.names)), np.zeros((len(measurement.names), simulator.nv))
-    for row, name in enumerate(measurement.names):
-        link = simulator.tree.link(source.joints[name])
-        y[row] = measurement.positions[row] - q[link.q][0]
-        if link.joint.kind is JointKind.REVOLUTE:  # an encoder may wrap where it likes
-            y[row] = (y[row] + np.pi) % (2.0 * np.pi) - np.pi
-        H[row, link.v] = 1.0
-    return Innovation(y, H, _alike(len(y), source.noise), max(len(y), 1))
+    @abstractmethod
+    def innovation(self, measurement: Any, q: np.ndarray) -> Innovation:
+        """A measurement, which must fit the source (``check``), against a configuration q (nq,).
+
+        The simulator's kinematics must be up to date (``move``). Rotations are compared in the tangent space of the expected
+        one, log(R_expected^T R_measured), in the measured frame's axes (Sola 2017, ch. 4). m may be 0, where no marker is seen.
+        """
+
+
+class PoseObserver(Observer):
+    """Sees a frame of a part."""
+
+    def __init__(self, source: PoseSource, simulator: Simulator) -> None:
+        self._frame, self._scale = PartFrame(source, simulator), source.scale
+        self._noise = np.diag(np.repeat([source.position_noise, source.orientation_noise], 3))
+
+    def innovation(self, measurement: PoseMeasurement, q: np.ndarray) -> Innovation:
+        y, H = self._frame.seen(self._scale * measurement.position, measurement.orientation)
+        if measurement.covariance is None:
+            return Innovation(y, H, self._noise, 6)
+        to_metres = np.repeat([self._scale, 1.0], 3)
+        return Innovation(y, H, to_metres[:, None] * np.linalg.cholesky(measurement.covariance), 6)
+
+
+class OrientationObserver(Observer):
+    """Sees which way a frame of a part is turned."""
+
+    def __init__(self, source: OrientationSource, simulator: Simulator) -> None:
+        self._frame = PartFrame(source, simulator)
+        self._noise = source.orientation_noise * np.eye(3)
+
+    def innovation(self, measurement: OrientationMeasurement, q: np.ndarray) -> Innovation:
+        y, H = self._frame.seen(NOWHERE, measurement.orientation)
+        covariance = measurement.covariance
+        return Innovation(y[3:], H[3:], self._noise if covariance is None else np.linalg.cholesky(covariance), 3)
+
+
+class PointsObserver(Observer):
+    """Sees markers, some of them."""
+
+    def __init__(self, source: PointsSource, simulator: Simulator) -> None:
+        frames = [simulator.frame(marker.part, marker.point) for marker in source.markers]
+        self._links = np.array([link for link, _, _ in frames])
+        self._places = np.array([place for _, place, _ in frames])
+        self._noise = np.diag(np.repeat([marker.noise or source.noise for marker in source.markers], 3))
+        self._memory, self._scratch = simulator.memory, np.empty((6, simulator.nv))
+
+    def innovation(self, measurement: PointsMeasurement, q: np.ndarray) -> Innovation:
+        seen, points = measurement.seen, measurement.points
+        links, places, noise = self._links, self._places, self._noise
+        if len(seen) < len(points):
+            rows = np.repeat(3 * seen, 3) + np.tile(np.arange(3), len(seen))
+            links, places, points, noise = links[seen], places[seen], points[seen], noise[np.ix_(rows, rows)]
+        y, H = np.empty(3 * len(seen)), np.empty((3 * len(seen), self._scratch.shape[1]))
+        see_points(self._memory.links, self._memory.work, links, places, points, y, H, self._scratch)
+        return Innovation(y, H, noise, 3)
+
+
+class JointsObserver(Observer):
+    """Sees coordinates of joints."""
+
+    def __init__(self, source: JointSource, simulator: Simulator) -> None:
+        self._links = {name: simulator.tree.link(joint) for name, joint in source.joints.items()}
+        self._noise, self._nv = source.noise, simulator.nv
+
+    def innovation(self, measurement: JointsMeasurement, q: np.ndarray) -> Innovation:
+        y, H = np.zeros(len(measurement.names)), np.zeros((len(measurement.names), self._nv))
+        for row, name in enumerate(measurement.names):
+            link = self._links[name]
+            y[row] = measurement.positions[row] - q[link.q][0]
+            if link.joint.kind is JointKind.REVOLUTE:  # an encoder may wrap where it likes
+                y[row] = (y[row] + np.pi) % (2.0 * np.pi) - np.pi
+            H[row, link.v] = 1.0
+        return Innovation(y, H, self._noise * np.eye(len(y)), max(len(y), 1))
+
+
+class PartFrame:
+    """A frame of a part, and what a measured pose says of it."""
+
+    def __init__(self, source: PoseSource | OrientationSource, simulator: Simulator) -> None:
+        self._memory, self._nv = simulator.memory, simulator.nv
+        self._place = simulator.frame(source.part, source.frame.position, source.frame.orientation)
+
+    def seen(self, position: np.ndarray, orientation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The innovation y (6,) and H (6, nv) of a measured position (3,) and orientation (4,)."""
+        y, H = np.empty(6), np.empty((6, self._nv))
+        see_frame(self._memory.links, self._memory.work, *self._place, position, orientation, y, H)
+        return y, H
+
+
+NOWHERE = np.zeros(3)
+OBSERVERS: dict[type[MeasurementSource], Any] = {
+    PoseSource: PoseObserver,
+    OrientationSource: OrientationObserver,
+    PointsSource: PointsObserver,
+    JointSource: JointsObserver,
+}
+"""What sees by each kind of source that is of the configuration."""
 
 
 @kernel
@@ -185,28 +257,3 @@ def see_points(
         put3(y[3 * i : 3 * i + 3], minus(get3(points[i]), p))
         for c in range(3):
             copy(scratch[3 + c], H[3 * i + c])
-
-
-NOWHERE = np.zeros(3)
-
-
-def _frame_seen(
-    simulator: Simulator, source: PoseSource | OrientationSource, position: np.ndarray, orientation: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """The innovation y (6,) and H (6, nv) of a measured pose of the source's frame."""
-    y, H = np.empty(6), np.empty((6, simulator.nv))
-    frame = simulator.frame(source.part, source.frame.position, source.frame.orientation)
-    see_frame(simulator.memory.links, simulator.memory.work, *frame, position, orientation, y, H)
-    return y, H
-
-
-def _markers(simulator: Simulator, source: PointsSource) -> tuple[np.ndarray, np.ndarray]:
-    """(k,) link and (k, 3) place on it of each marker."""
-    frames = [simulator.frame(marker.part, marker.point) for marker in source.markers]
-    return np.array([link for link, _, _ in frames]), np.array([place for _, place, _ in frames])
-
-
-@lru_cache(maxsize=64)  # which markers are seen changes from frame to frame
-def _alike(count: int, *deviations: float) -> np.ndarray:
-    """The lower factor of independent noise, ``count`` numbers of each deviation."""
-    return np.diag(np.repeat(deviations, count))

@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 
-from physics_prior.dynamics.arrays import add_product
-from physics_prior.dynamics.covariance import triangularise
+from physics_prior.dynamics.arrays import accumulate, add_product, clear
+from physics_prior.dynamics.covariance import add_rows, triangularise
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.types import Array
 
@@ -32,16 +32,16 @@ def lower_factor(W: np.ndarray) -> np.ndarray:
 
 @kernel
 def innovate(
-    U: Array, H: Array, noise: Array, y: Array, T: Array, scratch: Array, correction: Array
+    U: Array, H: Array, first: int, noise: Array, y: Array, T: Array, scratch: Array, correction: Array
 ) -> tuple[float, float, float]:
-    """Tell a factor U (n, n), P = U^T U, of an innovation y (m,), to which H (m, h <= n) makes the first h errors; fill T.
+    """Tell a factor U (n, n), P = U^T U, of an innovation y (m,), to which the rows of H (h, m) make h errors; fill T.
 
-    Return the squared length of y, whitened, the logarithm of the determinant of its covariance, and the largest of the first h
-    corrections; fill the correction (n,), gain times y. noise (m, m): a lower factor.
+    first: of these errors. Return the squared length of y, whitened, the logarithm of the determinant of its covariance, and
+    the largest correction of these errors; fill the correction (n,), gain times y. noise (m, m): a lower factor.
     Reflections turn T = [[noise^T, 0], [U H^T, U]], (m + n, m + n), into [[factor of the innovation's covariance, its product
     with the gain], [0, factor of the posterior]], all transposed. scratch (2 m + 2 n,).
     """
-    m, n, h = H.shape[0], U.shape[0], H.shape[1]
+    m, n, end = H.shape[1], U.shape[0], first + H.shape[0]
     for i in range(m):
         row = T[i]
         for j in range(m):
@@ -54,10 +54,7 @@ def innovate(
             row[j] = 0.0
         for j in range(n):
             row[m + j] = own[j]
-        for j in range(h):
-            if own[j] != 0.0:
-                for i in range(m):
-                    row[i] += own[j] * H[i, j]
+        add_rows(own[first:end], H, row)
     triangularise(T, m, scratch)
     nis, determinant = 0.0, 0.0
     for j in range(n):
@@ -73,7 +70,52 @@ def innovate(
         for j in range(n):
             correction[j] += white * T[i, m + j]
     largest = 0.0
+    for j in range(first, end):
+        largest = max(largest, abs(correction[j]))
+    return nis, determinant, largest
+
+
+@kernel
+def correct(
+    U: Array, H: Array, first: int, y: Array, T: Array, scratch: Array, correction: Array
+) -> tuple[float, float, float]:
+    """Do so without finding the posterior's factor, for noise of unit covariance; T (m + n, m) is scratch.
+
+    With R^T R the innovation's covariance the correction is P H^T (R^T R)^-1 y.
+    """
+    m, n, h = H.shape[1], U.shape[0], H.shape[0]
+    clear(T)
+    for i in range(m):
+        T[i, i] = 1.0
+    for k in range(n):
+        add_rows(U[k, first : first + h], H, T[m + k])
+    triangularise(T, m, scratch)
+    nis, determinant = 0.0, 0.0
+    for i in range(m):
+        white = y[i]
+        for j in range(i):
+            white -= T[j, i] * scratch[j]
+        white /= T[i, i]
+        scratch[i] = white
+        nis += white * white
+        determinant += 2.0 * math.log(T[i, i])
+    for i in range(m - 1, -1, -1):
+        for j in range(i + 1, m):
+            scratch[i] -= T[i, j] * scratch[j]
+        scratch[i] /= T[i, i]
+    x, e = scratch[:m], scratch[m : m + h]
     for j in range(h):
+        e[j] = 0.0
+        for i in range(m):
+            e[j] += H[j, i] * x[i]
+    clear(correction)
+    for k in range(n):
+        share = 0.0
+        for j in range(h):
+            share += U[k, first + j] * e[j]
+        accumulate(share, U[k], correction)
+    largest = 0.0
+    for j in range(first, first + h):
         largest = max(largest, abs(correction[j]))
     return nis, determinant, largest
 
@@ -98,23 +140,21 @@ def whiten(noise: Array, block: int, H: Array, y: Array) -> None:
 def block_squares(H: Array, y: Array, U: Array, block: int, T: Array, scratch: Array, out: Array) -> None:
     """Fill out (k,) with the normalised innovation squared of each block of an innovation alone, H (k block, h), y (k block,).
 
-    Both are whitened: a block's covariance is 1 + s^T s with s = U H^T, of which reflections turn T (block + n, block) into a
-    factor, whose diagonal is 1 and more, however little is known. scratch (n + 2 block,).
+    Both are whitened: a block's covariance is 1 + s^T s with s = U H^T, of which reflections turn T (block + h, block) into a
+    factor, whose diagonal is 1 and more, however little is known. U (h, h): the triangular factor of those errors' covariance.
+    scratch (h + 2 block,).
     """
-    n, h = U.shape[0], H.shape[1]
+    h = H.shape[1]
     for index in range(out.shape[0]):
         first = block * index
         for i in range(block):
             for j in range(block):
                 T[i, j] = 1.0 if i == j else 0.0
-        for k in range(n):
+        for k in range(h):
             row, own = T[block + k], U[k]
-            begin = 0
-            while begin < h and own[begin] == 0.0:
-                begin += 1
             for i in range(block):
                 total, seen = 0.0, H[first + i]
-                for j in range(begin, h):
+                for j in range(k, h):
                     total += own[j] * seen[j]
                 row[i] = total
         triangularise(T, block, scratch)

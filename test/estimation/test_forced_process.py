@@ -12,7 +12,7 @@ from scipy.stats import chi2
 from physics_prior import rotations
 from physics_prior.dynamics.wrench_deviations import wrench_deviations
 from physics_prior.errors import SceneError
-from physics_prior.estimation import ground, stance
+from physics_prior.estimation import bearing, ground, stance
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.estimation.filter import ITERATIONS, SMALL_CORRECTION, Filter, Posterior
 from physics_prior.estimation.gain import gain_of
@@ -218,7 +218,7 @@ def test_contact_is_told_by_height_speed_and_load(process, standing, height, spe
     state.v[0] = speed
     state.force[foot.span.start + 2] = load
     process.simulator.move(state.q, state.v)
-    assert ground.stands(process.simulator, foot, state, stood, True, np.zeros((process.nv, 1)), deviation) is stands
+    assert ground.stands(process, 0, state, stood, True, np.zeros((process.n, 1)), deviation) is stands
 
 
 def test_feet_lift_and_land_in_the_filter(process, standing):
@@ -324,11 +324,25 @@ def test_a_sole_that_stands_on_edge_has_bounds(process, standing, yaw):
     state, upright = standing.copy(), rotations.exp(np.array([0.5 * np.pi, 0.0, 0.0]))
     state.q[3:7] = rotations.multiply(upright, rotations.exp(np.array([0.0, 0.0, yaw])))
     process.simulator.move(state.q, state.v)
-    (foot, _), wrench = process.unknown.feet, np.array([0.0, 0.0, 300.0, 0.0, 0.0, 0.0])
-    rows = ground.bounds(process.simulator, foot, wrench)
+    foot, wrench, rows = process.unknown.feet[0], np.array([0.0, 0.0, 300.0, 0.0, 0.0, 0.0]), np.empty((6, 6))
+    work, sole = process.simulator.memory.work, process.unknown.soles[0]
+    bearing.fill_bounds(work, sole, wrench, rows)
     assert np.max(np.abs(rows)) < 1e4  # 1 / m: over a tenth of the shorter side, by the height
     assert (rows[0] @ wrench, rows[1] @ wrench) == (300.0, 300.0 * foot.sole.friction)
-    assert np.isfinite(ground.borne(process.simulator, foot, 10.0 + wrench)).all()
+    beyond = 10.0 + wrench
+    bearing.cut(work, sole, beyond, rows)
+    assert np.isfinite(beyond).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_sole_seen_from_above_is_inverted_as_by_its_singular_values(seed):
+    A = np.random.default_rng(seed).normal(size=(2, 2))
+    if seed == 0:
+        A = np.diag([0.1, 0.1])  # any directions are its singular vectors
+    U, s, Vt = np.linalg.svd(A)
+    for least in (0.0, 0.5 * (s[0] + s[1]), 2.0 * s[0]):
+        expected = (Vt.T / np.maximum(s, least)) @ U.T
+        np.testing.assert_allclose(bearing.edges_inverse(*A.reshape(-1), least), expected.reshape(-1), rtol=1e-10)
 
 
 @pytest.mark.parametrize("name", ["kinematic", "frozen"])

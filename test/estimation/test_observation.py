@@ -16,7 +16,8 @@ from physics_prior.estimation.measurement import (
     PointsMeasurement,
     PoseMeasurement,
 )
-from physics_prior.estimation.observation import check, innovation
+from physics_prior.estimation.observation import check
+from physics_prior.estimation.process import State
 from physics_prior.recording.simulate import motion
 
 seeds = st.integers(0, 2**32 - 1)
@@ -27,8 +28,7 @@ def _state(scene, seed, spread=1.0):
 
 
 def _see(filter, measurement, q):
-    filter.simulator.move(q, np.zeros(filter.simulator.nv))
-    return innovation(filter.sources[measurement.topic], measurement, filter.simulator, q)
+    return filter.innovation(measurement, State(q, np.zeros(filter.simulator.nv), np.zeros(0)))
 
 
 @pytest.fixture(scope="module")

@@ -31,7 +31,9 @@ def _update(S, H, noise, y):
     """NIS, correction and posterior factor, and the logarithm of the determinant of the innovation's covariance."""
     n, m = len(S), len(y)
     T, correction = np.empty((m + n, m + n)), np.empty(n)
-    nis, determinant, largest = innovate(np.ascontiguousarray(S.T), H, noise, y, T, np.empty(2 * (m + n)), correction)
+    nis, determinant, largest = innovate(
+        np.ascontiguousarray(S.T), np.ascontiguousarray(H.T), 0, noise, y, T, np.empty(2 * (m + n)), correction
+    )
     assert largest == np.max(np.abs(correction[: H.shape[1]]))
     return nis, correction, T[m:, m:].T, determinant
 

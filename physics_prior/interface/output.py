@@ -50,8 +50,8 @@ class Output:
         self._lag = {} if lag == 0.0 else {"lag s": "the whole recording" if math.isinf(lag) else f"{lag:g}"}
         self.topics = topics_of(scene)
         self._scene, self._simulator = scene, simulator
-        self._scalars, self._vectors = scalar_links(scene.tree), vector_links(scene.tree)
-        self._free, self._balls = free_links(scene.tree), ball_links(scene.tree)
+        self._joints = states.Joints(scalar_links(scene.tree), ball_links(scene.tree))
+        self._free, self._vectors = free_links(scene.tree), vector_links(scene.tree)
         self._forces = force_topics(scene)
         self._published = published_names(scene)
         self._names = scene.tree.freedom_names
@@ -68,9 +68,9 @@ class Output:
         header = self._header(estimate.stamp)
         out: list[Publication] = []
         self._simulator.move(estimate.q, estimate.v)
-        if self._scalars or self._balls:
-            out.append((JOINT_STATES, states.joint_states(header, self._scalars, estimate, self._balls)))
-            out.append((JOINT_DEVIATIONS, states.joint_deviations(header, self._scalars, estimate, self._balls)))
+        if self._joints.names:
+            out.append((JOINT_STATES, states.joint_states(header, self._joints, estimate)))
+            out.append((JOINT_DEVIATIONS, states.joint_deviations(header, self._joints, estimate)))
         if self._vectors:
             joints = states.multi_dof_joint_states(header, self._vectors, estimate, self._simulator)
             out.append((MULTI_DOF_JOINT_STATES, joints))

@@ -28,6 +28,7 @@ from physics_prior.recording.messages import (
     Odometry,
     PoseWithCovariance,
     PoseWithCovarianceStamped,
+    Quaternion,
     TFMessage,
     Transform,
     TransformStamped,
@@ -36,42 +37,51 @@ from physics_prior.recording.messages import (
     Vector3,
 )
 
+IDENTITY, NONE = np.eye(3), Vector3()
 
-def joint_states(header: Header, links: Sequence[Link], estimate: Estimate, balls: Sequence[Link] = ()) -> JointState:
-    """Position, velocity and effort (generalized force of the effects) of revolute and prismatic joints.
 
-    Behind them those of the three hinges that stand for each ball joint in the URDF, so that robot_state_publisher knows all.
+class Joints:
+    """The joints of joint_states, of one degree of freedom each: the tree's own, behind them the hinges of its ball joints.
+
+    These three for each ball joint stand for it in the URDF, so that robot_state_publisher knows all.
     """
-    names = [link.joint.name for link in links]
-    at, rate = [link.q.start for link in links], [link.v.start for link in links]
+
+    def __init__(self, links: Sequence[Link], balls: Sequence[Link] = ()) -> None:
+        hinges = [name for link in balls for name in hinge_names(link.joint.name)]
+        self.names = (*(link.joint.name for link in links), *hinges)
+        self.positions = np.array([link.q.start for link in links], dtype=int)
+        self.freedoms = np.array([link.v.start for link in links], dtype=int)
+        self.quaternions = np.array([np.r_[link.q] for link in balls], dtype=int).reshape(-1, 4)
+        self.turns = np.array([np.r_[link.v] for link in balls], dtype=int).reshape(-1, 3)
+
+
+def joint_states(header: Header, joints: Joints, estimate: Estimate) -> JointState:
+    """Position, velocity and effort (generalized force of the effects) of the joints."""
+    at, rate = joints.positions, joints.freedoms
     columns = [[estimate.q[at]], [estimate.v[rate]], [estimate.effort[rate]]]
-    for link in balls:
-        names += hinge_names(link.joint.name)
-        angles = hinge_angles(estimate.q[link.q])
-        rates = rates_per_omega(angles) @ estimate.v[link.v]
-        torques = omega_per_rates(angles).T @ estimate.effort[link.v]
+    if len(joints.turns):
+        angles = hinge_angles(estimate.q[joints.quaternions])
+        rates = (rates_per_omega(angles) @ estimate.v[joints.turns][..., None])[..., 0]
+        torques = (estimate.effort[joints.turns][:, None] @ omega_per_rates(angles))[:, 0]
         for column, own in zip(columns, (angles, rates, torques), strict=True):
-            column.append(own)
-    return JointState(header, tuple(names), *(np.concatenate(column) for column in columns))
+            column.append(own.reshape(-1))
+    return JointState(header, joints.names, *(np.concatenate(column) for column in columns))
 
 
-def joint_deviations(
-    header: Header, links: Sequence[Link], estimate: Estimate, balls: Sequence[Link] = ()
-) -> JointState:
+def joint_deviations(header: Header, joints: Joints, estimate: Estimate) -> JointState:
     """Standard deviations of position and velocity, in the fields of these; a JointState has no place of its own for them."""
-    at = [link.v.start for link in links]
-    names = [link.joint.name for link in links]
-    positions, velocities = [estimate.position_deviation[at]], [estimate.velocity_deviation[at]]
-    nv = len(estimate.v)
-    for link in balls:
-        names += hinge_names(link.joint.name)
-        angles = hinge_angles(estimate.q[link.q])
-        J = state_derivative(angles, rates_per_omega(angles) @ estimate.v[link.v])
-        own = np.r_[link.v.start : link.v.stop, nv + link.v.start : nv + link.v.stop]
-        spread = np.sqrt(np.maximum(np.diag(J @ estimate.covariance[np.ix_(own, own)] @ J.T), 0.0))
-        positions.append(spread[:3])
-        velocities.append(spread[3:])
-    return JointState(header, tuple(names), np.concatenate(positions), np.concatenate(velocities))
+    nv, turns = len(estimate.v), joints.turns
+    variances = np.diag(estimate.covariance)
+    columns = [np.sqrt(variances[joints.freedoms]), np.sqrt(variances[nv + joints.freedoms])]
+    if len(turns):
+        angles = hinge_angles(estimate.q[joints.quaternions])
+        rates = (rates_per_omega(angles) @ estimate.v[turns][..., None])[..., 0]
+        J = state_derivative(angles, rates)
+        own = np.concatenate([turns, nv + turns], axis=1)
+        of_hinges = np.sum(J @ estimate.covariance[own[:, :, None], own[:, None, :]] * J, axis=-1)
+        spread = np.sqrt(np.maximum(of_hinges, 0.0))
+        columns = [np.append(columns[0], spread[:, :3]), np.append(columns[1], spread[:, 3:])]
+    return JointState(header, joints.names, *columns)
 
 
 def transforms(header: Header, links: Sequence[Link], estimate: Estimate) -> TFMessage:
@@ -104,16 +114,17 @@ def multi_dof_joint_states(
     The transform is the joint's own, its zero to its child. Twist, of the child relative to the parent, and wrench, that of the
     joint ON the child, are vectors in the frame of the header, the twist's linear part at the child's origin.
     """
+    q, v = estimate.q.tolist(), estimate.v.tolist()
     transforms, twists, wrenches = [], [], []
     for link in links:
-        q, v = estimate.q[link.q], estimate.v[link.v]
+        w, x, y, z = q[link.q][-4:]
         _, R = simulator.pose(link.part)
         translation, linear = (
-            (vector_of(q[:3]), vector_of(v[:3])) if link.joint.kind is JointKind.FREE else (Vector3(), Vector3())
+            (Vector3(*q[link.q][:3]), Vector3(*v[link.v][:3])) if link.joint.kind is JointKind.FREE else (NONE, NONE)
         )
         wrench = estimate.wrenches[link.joint.name]
-        transforms.append(Transform(translation, quaternion_of(q[-4:])))
-        twists.append(Twist(linear, vector_of(R @ v[-3:])))
+        transforms.append(Transform(translation, Quaternion(x, y, z, w)))
+        twists.append(Twist(linear, vector_of(R @ estimate.v[link.v][-3:])))
         wrenches.append(wrench_of(wrench.force, wrench.moment))
     names = tuple(link.joint.name for link in links)
     return MultiDOFJointState(header, names, transforms, twists, wrenches)
@@ -130,18 +141,18 @@ def odometry(header: Header, link: Link, estimate: Estimate) -> Odometry:
     velocity, omega = estimate.v[link.v][:3], estimate.v[link.v][3:]
     R = rotations.matrix_from_quaternion(wxyz)
     seen = R.T @ velocity
-    nv = len(estimate.v)
-    own = np.r_[link.v.start : link.v.stop, nv + link.v.start : nv + link.v.stop]
-    covariance = estimate.covariance[np.ix_(own, own)]
-    to_pose = np.zeros((6, 12))
-    to_pose[:3, :3], to_pose[3:, 3:6] = np.eye(3), R
-    to_twist = np.zeros((6, 12))
-    to_twist[:3, 3:6], to_twist[:3, 6:9], to_twist[3:, 9:] = rotations.skew(seen), R.T, np.eye(3)
+    own = np.arange(link.v.start, link.v.stop)
+    own = np.concatenate([own, len(estimate.v) + own])
+    # pose and twist of the message by the errors of position, turn, velocity and angular velocity
+    J = np.zeros((12, 12))
+    J[:3, :3] = J[9:, 9:] = IDENTITY
+    J[3:6, 3:6], J[6:9, 3:6], J[6:9, 6:9] = R, rotations.skew(seen), R.T
+    covariance = J @ estimate.covariance[own[:, None], own] @ J.T
     return Odometry(
         header,
         link.part,
-        PoseWithCovariance(pose_of(position, wxyz), _flat(to_pose @ covariance @ to_pose.T)),
-        TwistWithCovariance(Twist(vector_of(seen), vector_of(omega)), _flat(to_twist @ covariance @ to_twist.T)),
+        PoseWithCovariance(pose_of(position, wxyz), _flat(covariance[:6, :6])),
+        TwistWithCovariance(Twist(vector_of(seen), vector_of(omega)), _flat(covariance[6:, 6:])),
     )
 
 

@@ -12,7 +12,7 @@ not this module's task.
 
 import struct
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from operator import attrgetter, getitem
 from typing import Any, Protocol
 
@@ -266,15 +266,21 @@ def _read_text(body: memoryview, position: int, order: int, where: str) -> tuple
 
 
 def _write_text(body: bytearray, text: Any, where: str) -> None:
-    if not isinstance(text, str) or "\0" in text:
+    if not isinstance(text, str):
+        raise _does_not_fit(where, text, "text without NUL")
+    body += bytes(-len(body) & 3)
+    body += _text_bytes(text, where)
+
+
+@lru_cache(maxsize=1024)  # names come again in every message
+def _text_bytes(text: str, where: str) -> bytes:
+    if "\0" in text:
         raise _does_not_fit(where, text, "text without NUL")
     try:
         encoded = text.encode()
     except UnicodeEncodeError:
         raise _does_not_fit(where, ascii(text), "text that UTF-8 can hold") from None
-    _write_length(body, len(encoded) + 1)
-    body += encoded
-    body.append(0)
+    return LENGTHS[LITTLE].pack(len(encoded) + 1) + encoded + b"\0"
 
 
 class _StringSequence:

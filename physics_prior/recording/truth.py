@@ -8,7 +8,7 @@ from physics_prior.dynamics.simulator import Simulator
 from physics_prior.errors import RecordingError
 from physics_prior.estimation.estimate import Estimate, Health, Level
 from physics_prior.interface.geometry import array_of, header_of, wrench_of, wxyz_of
-from physics_prior.interface.states import joint_states, multi_dof_joint_states, odometry
+from physics_prior.interface.states import Joints, joint_states, multi_dof_joint_states, odometry
 from physics_prior.interface.topics import (
     JOINT_STATES,
     MULTI_DOF_JOINT_STATES,
@@ -44,11 +44,11 @@ class Truth:
 
     def __init__(self, scene: Scene, simulator: Simulator) -> None:
         self._scene, self._simulator = scene, simulator
-        self._scalars, self._vectors = scalar_links(scene.tree), vector_links(scene.tree)
+        self._joints, self._vectors = Joints(scalar_links(scene.tree)), vector_links(scene.tree)
         self._free = free_links(scene.tree)
         self._forces = {name: PREFIX + topic for name, topic in force_topics(scene).items()}
         self.topics: dict[str, type[Message]] = {}
-        if self._scalars:
+        if self._joints.names:
             self.topics[PREFIX + JOINT_STATES] = JointState
         if self._vectors:
             self.topics[PREFIX + MULTI_DOF_JOINT_STATES] = MultiDOFJointState
@@ -62,8 +62,8 @@ class Truth:
         """Each topic's message at a state. Forces are the scene's own: the unknown white force has no value to tell."""
         state = self._certain(stamp, q, v)
         header = header_of(stamp, self._scene.frame_id)
-        if self._scalars:
-            yield PREFIX + JOINT_STATES, joint_states(header, self._scalars, state)
+        if self._joints.names:
+            yield PREFIX + JOINT_STATES, joint_states(header, self._joints, state)
         if self._vectors:
             self._simulator.move(q, v)
             yield (

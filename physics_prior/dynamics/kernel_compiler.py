@@ -16,9 +16,12 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, CompileResult, compile_result
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.environment import lookup_environment
+from numba.core.errors import LoweringError
 from numba.core.registry import CPUDispatcher
 
 from physics_prior.dynamics.kernel_cache import KernelCache
+
+ALLOCATES = "NRT_MemInfo_alloc"
 
 
 class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc]
@@ -81,8 +84,16 @@ class _TypeInference(typed_passes.NopythonTypeInference):  # type: ignore[misc]
             state.typingctx = context
 
 
+class _Lowering(typed_passes.NativeLowering):  # type: ignore[misc]
+    """Lowering without counts of references, a quarter of the code: kernels allocate nothing, Python holds their arguments."""
+
+    def run_pass(self, state: Any) -> bool:
+        state.targetctx = state.targetctx.subtarget(enable_nrt=False)
+        return cast(bool, super().run_pass(state))
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
-class _InnerLowering(typed_passes.NativeLowering):  # type: ignore[misc]
+class _InnerLowering(_Lowering):
     _name = "inner_lowering"
 
     def run_pass(self, state: Any) -> bool:
@@ -96,13 +107,18 @@ class _InnerLowering(typed_passes.NativeLowering):  # type: ignore[misc]
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
-class _EntryLowering(typed_passes.NativeLowering):  # type: ignore[misc]
+class _EntryLowering(_Lowering):
     _name = "entry_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        state.library = _EntryLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        name = state.func_id.func_qualname
+        if isinstance(state.return_type, types.Array):
+            raise LoweringError(f"kernel '{name}' returns an array to Python: have it write into one that it is given")
+        state.library = _EntryLibrary(state.targetctx.codegen(), name)
         state.library.enable_object_caching()
         super().run_pass(state)
+        if any(function.name.startswith(ALLOCATES) for function in state.library._final_module.functions):
+            raise LoweringError(f"kernel '{name}' allocates memory: have it write into an array that it is given")
         # what taken-in kernels print stands in environments of theirs
         names = [variable.name for variable in state.library._final_module.global_variables]
         for environment in filter(None, map(lookup_environment, names)):

@@ -8,8 +8,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numba import carray, types
+from numba import types
 from numba.extending import intrinsic
+from numba.np.arrayobj import np_cfarray
 
 from physics_prior.dynamics.constraint_derivatives import GAP
 from physics_prior.dynamics.derivatives import COMPOSITE, FREEDOM
@@ -85,14 +86,16 @@ class Memory:
 
 
 @intrinsic
-def address(_typing_context: Any, array: Any, index: Any) -> Any:
-    """The address of an element of an array, for ``carray``."""
+def array_at(_typing_context: Any, array: Any, index: Any, shape: Any, dtype: Any) -> Any:
+    """A bare array of that shape and dtype, C order, that begins at an element of an array: Numba's ``carray``, in one go."""
+    made = types.Array(dtype.dtype, len(shape) if isinstance(shape, types.BaseTuple) else 1, "C")
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-        return builder.bitcast(builder.gep(data, [arguments[1]]), context.get_value_type(types.voidptr))
+        data = context.make_array(array)(context, builder, arguments[0]).data
+        address = builder.bitcast(builder.gep(data, [arguments[1]]), context.get_value_type(types.voidptr))
+        return np_cfarray(context, builder, made(types.voidptr, shape), (address, arguments[2]))
 
-    return types.voidptr(array, types.intp), build
+    return made(array, types.intp, shape, dtype), build
 
 
 @inline_kernel
@@ -112,14 +115,14 @@ def sections(memory: Array) -> Any:
     g = f + int(memory[VECTORS]) * nv
     p = g + int(memory[WORKSPACE])
     return (
-        carray(address(memory, HEAD), n, LINK),
-        carray(address(memory, a), n, WORK),
-        carray(address(memory, b), couples, PAIR),
-        carray(address(memory, c), (m + 3, (d - c) // (m + 3)), FLOAT),
-        carray(address(memory, d), nq + 2, FLOAT),
-        carray(address(memory, e), nq, FLOAT),
-        carray(address(memory, f), (int(memory[VECTORS]), nv), FLOAT),
-        carray(address(memory, p), int(memory[CONTACT_PART]) - p, FLOAT),
+        array_at(memory, HEAD, n, LINK),
+        array_at(memory, a, n, WORK),
+        array_at(memory, b, couples, PAIR),
+        array_at(memory, c, (m + 3, (d - c) // (m + 3)), FLOAT),
+        array_at(memory, d, nq + 2, FLOAT),
+        array_at(memory, e, nq, FLOAT),
+        array_at(memory, f, (int(memory[VECTORS]), nv), FLOAT),
+        array_at(memory, p, int(memory[CONTACT_PART]) - p, FLOAT),
     )
 
 
@@ -128,7 +131,7 @@ def workspace(memory: Array) -> Array:
     """Derivatives' own scratch in the memory, of ``tangent_size``, where the integrator needs them in a plain step."""
     nv, vectors, size = int(memory[4]), int(memory[VECTORS]), int(memory[WORKSPACE])
     spare = _spare_start(memory)
-    array: Array = carray(address(memory, spare + vectors * nv), size, FLOAT)
+    array: Array = array_at(memory, spare + vectors * nv, size, FLOAT)
     return array
 
 
@@ -136,7 +139,7 @@ def workspace(memory: Array) -> Array:
 def stage_configuration(memory: Array) -> Array:
     """A configuration (nq,) of scratch, in the first two vectors beyond SPARE."""
     nv = int(memory[4])
-    array: Array = carray(address(memory, _spare_start(memory) + SPARE * nv), int(memory[3]), FLOAT)
+    array: Array = array_at(memory, _spare_start(memory) + SPARE * nv, int(memory[3]), FLOAT)
     return array
 
 
@@ -164,10 +167,10 @@ def correction_sections(scratch: Array, m: int, nv: int, k: int) -> Any:
     """The sections of that: M^-1 A^T transposed (m, nv), right sides, answers and changes (m, k)."""
     a = m * nv
     return (
-        carray(address(scratch, 0), (m, nv), FLOAT),
-        carray(address(scratch, a), (m, k), FLOAT),
-        carray(address(scratch, a + m * k), (m, k), FLOAT),
-        carray(address(scratch, a + 2 * m * k), (m, k), FLOAT),
+        array_at(scratch, 0, (m, nv), FLOAT),
+        array_at(scratch, a, (m, k), FLOAT),
+        array_at(scratch, a + m * k, (m, k), FLOAT),
+        array_at(scratch, a + 2 * m * k, (m, k), FLOAT),
     )
 
 
@@ -184,11 +187,11 @@ def tangent_sections(tangent: Array, n: int, m: int, nv: int) -> Any:
     e = d + n * COMPOSITE_SIZE
     f = e + nv * GAP_SIZE
     return (
-        carray(address(tangent, 0), (nv, 2 * nv), FLOAT),
-        carray(address(tangent, a), (nv + 4 * m, nv), FLOAT),
-        carray(address(tangent, b), c - b, FLOAT),
-        carray(address(tangent, c), nv, FREEDOM),
-        carray(address(tangent, d), n, COMPOSITE),
-        carray(address(tangent, e), nv, GAP),
-        carray(address(tangent, f), ((tangent.shape[0] - f) // (2 * nv * nv), nv, 2 * nv), FLOAT),
+        array_at(tangent, 0, (nv, 2 * nv), FLOAT),
+        array_at(tangent, a, (nv + 4 * m, nv), FLOAT),
+        array_at(tangent, b, c - b, FLOAT),
+        array_at(tangent, c, nv, FREEDOM),
+        array_at(tangent, d, n, COMPOSITE),
+        array_at(tangent, e, nv, GAP),
+        array_at(tangent, f, ((tangent.shape[0] - f) // (2 * nv * nv), nv, 2 * nv), FLOAT),
     )

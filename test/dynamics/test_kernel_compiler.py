@@ -83,6 +83,26 @@ def test_errors_and_words_of_kernels_taken_in_come_out(use):
     assert use("print(total(np.ones(3)))").splitlines() == ["total 1.0", "1.0"]
 
 
+def test_what_allocates_or_hands_an_array_to_python_is_refused(use):
+    """Nothing counts references in a kernel: memory that it allocates would never be freed."""
+    told = use(
+        "from numba.core.errors import NumbaError\n"
+        "@kernel\ndef twice(x):\n    out = np.zeros(2)\n    out[0] = x\n    return 2.0 * out[0]\n"
+        "@kernel\ndef through(x):\n    return twice(x)\n"
+        "@kernel\ndef rest(numbers):\n    return numbers[1:]\n"
+        "@kernel\ndef second(numbers):\n    return rest(numbers)[0]\n"
+        "for ask in (lambda: twice(1.0), lambda: through(1.0), lambda: rest(np.arange(3.0)), lambda: second(np.arange(3.0))):\n"
+        "    try: print(ask())\n"
+        "    except NumbaError as problem: print(str(problem).splitlines()[1])\n"
+    )
+    assert told.splitlines() == [
+        "kernel 'twice' allocates memory: have it write into an array that it is given",
+        "kernel 'through' allocates memory: have it write into an array that it is given",
+        "kernel 'rest' returns an array to Python: have it write into one that it is given",
+        "1.0",
+    ]
+
+
 def test_another_checkout_of_the_same_sources_finds_what_is_compiled(tmp_path):
     package = Path(algebra.__file__).parents[1]
     shutil.copytree(package, tmp_path / "physics_prior")

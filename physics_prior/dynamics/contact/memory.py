@@ -3,12 +3,11 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import carray
 
 from physics_prior.dynamics.contact.geometry.pairs import ASKED, ROW, SLOTS
 from physics_prior.dynamics.contact.records import CANDIDATE, CONTACT
 from physics_prior.dynamics.kernel import inline_kernel
-from physics_prior.dynamics.memory import CONTACT_PART, FLOAT, address
+from physics_prior.dynamics.memory import CONTACT_PART, FLOAT, array_at
 from physics_prior.dynamics.types import Array
 
 HEAD = 10
@@ -81,13 +80,13 @@ def contact_sections(memory: Array) -> Any:
     w, nq = int(memory[base + 3]), int(memory[base + 4])
     a, b, d, e, f, g, h = _starts(n, c, m, w)
     return (
-        carray(address(memory, base + a), n, CANDIDATE),
-        carray(address(memory, base + b), c, CONTACT),
-        carray(address(memory, base + d), (SLOTS + ASKED, ROW), FLOAT),
-        carray(address(memory, base + e), (2, m, w), FLOAT),
-        carray(address(memory, base + f), (2, m, m), FLOAT),
-        carray(address(memory, base + g), (VECTORS, m), FLOAT),
-        carray(address(memory, base + h), (STATES, nq), FLOAT),
+        array_at(memory, base + a, n, CANDIDATE),
+        array_at(memory, base + b, c, CONTACT),
+        array_at(memory, base + d, (SLOTS + ASKED, ROW), FLOAT),
+        array_at(memory, base + e, (2, m, w), FLOAT),
+        array_at(memory, base + f, (2, m, m), FLOAT),
+        array_at(memory, base + g, (VECTORS, m), FLOAT),
+        array_at(memory, base + h, (STATES, nq), FLOAT),
     )
 
 

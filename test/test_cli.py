@@ -227,6 +227,7 @@ def test_check_tells_as_json_what_each_effect_adds_to_a_step(capsys):
     assert told["state"] == {"q": 3, "v": 3, "error_state": 6}
     assert told["constraints"] == {"rows": 3, "acting": 3, "rank": 2}
     assert told["step"]["us_with_derivatives"] > told["step"]["us"] > 0.0
+    assert told["step"]["stable"]
 
 
 def test_check_tells_rows_of_what_may_touch(capsys, tmp_path):

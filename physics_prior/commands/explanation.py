@@ -29,7 +29,7 @@ from physics_prior.scene import (
     Scene,
     SwitchSource,
 )
-from physics_prior.stepping import Choice
+from physics_prior.stepping import Choice, stable
 
 MOST_POINTS = {"sphere": 1, "ellipsoid": 1, "capsule": 2, "box": SLOTS, "plane": SLOTS}
 """At how many points a surface can touch another."""
@@ -57,6 +57,7 @@ def scene_figures(scene: Scene, costs: Sequence[float] | None = None, choice: Ch
     with compiling(scene, "carry"):
         simulator = scene.simulator()
         step, with_derivatives = _cost(scene, simulator)
+        follows = stable(simulator, scene.initial.q, scene.initial.v, scene.step.size)
     effects = []
     for place, effect in enumerate(scene.effects):
         equal, unequal = _rows(scene, effect)
@@ -78,6 +79,7 @@ def scene_figures(scene: Scene, costs: Sequence[float] | None = None, choice: Ch
         "step": {
             "integrator": scene.step.integrator,
             "size": scene.step.size,
+            "stable": follows,
             "us": step,
             "us_with_derivatives": with_derivatives,
         },
@@ -193,7 +195,10 @@ def _state(scene: Scene, figures: dict[str, Any]) -> Table:
     out.add_row("constraints", _constraints(figures))
     own = [topic for topic in topics_of(scene) if not topic.endswith("/stddev")]
     out.add_row("publishes", ", ".join(own) + "; of joints and forces also TOPIC/stddev")
-    out.add_row("step", f"{step['integrator']}, {step['size'] * 1e3:g} ms")
+    size = f"{step['integrator']}, {step['size'] * 1e3:g} ms"
+    out.add_row(
+        "step", size if step["stable"] else f"{size}: TOO LARGE, what should decay grows in it; take a smaller one"
+    )
     if scene.step.sleep is not None:
         sleep = scene.step.sleep
         limits = f"slower than {sleep.velocity:g} m/s and rad/s for {sleep.duration:g} s"

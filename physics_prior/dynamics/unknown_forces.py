@@ -6,8 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from physics_prior.dynamics.algebra import get3, put3
 from physics_prior.dynamics.compose import GRAVITY
+from physics_prior.dynamics.kernel import kernel
+from physics_prior.dynamics.kinematics import point_jacobian
 from physics_prior.dynamics.sole import SOLE, sole_record
+from physics_prior.dynamics.types import Array, Records
 from physics_prior.effects.effect import Effect
 from physics_prior.effects.unknown_force import Sole, check_together
 from physics_prior.model import Tree
@@ -74,11 +78,10 @@ class UnknownForces:
 
     def columns(self, simulator: "Simulator") -> np.ndarray:
         """D (nv, count): generalized forces by f; needs ``simulator.move``."""
-        D = np.zeros((simulator.nv, self.count))
+        D, memory = np.zeros((simulator.nv, self.count)), simulator.memory
         D[self.freedoms, self.torques] = 1.0
-        for foot in self.feet:
-            J = simulator.jacobian(foot.sole.part, foot.sole.center)
-            D[:, foot.span] = np.vstack([J[3:], J[:3]]).T
+        if self.feet:
+            fill_wrench_columns(memory.links, memory.work, self.soles, D, np.empty((6, simulator.nv)), np.empty(3))
         return D
 
     def wrench_rows(self) -> np.ndarray:
@@ -93,3 +96,15 @@ class UnknownForces:
             position, R = simulator.pose(foot.sole.part)
             out.append(position + R @ foot.sole.center)
         return out
+
+
+@kernel
+def fill_wrench_columns(links: Records, work: Records, soles: Records, D: Array, J: Array, place: Array) -> None:
+    """Fill the columns of D (nv, nf) that are of feet: generalized forces by their wrenches. J (6, nv), place (3,)."""
+    for index in range(soles.shape[0]):
+        sole = soles[index]
+        put3(place, get3(sole.center))
+        point_jacobian(links, work, sole.link, place, J)
+        for k in range(D.shape[0]):
+            for c in range(3):
+                D[k, sole.force + c], D[k, sole.force + 3 + c] = J[3 + c, k], J[c, k]

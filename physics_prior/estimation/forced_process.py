@@ -9,12 +9,14 @@ Muscles hold the posture against what the ground does: the noise of a foot's wre
 accelerations of the joints as they are, so that a surprise under the foot moves the whole body, not the foot alone.
 """
 
+import math
+
 import numpy as np
 
-from physics_prior.dynamics.arrays import add_product
+from physics_prior.dynamics.arrays import accumulate, add_product, clear, copy
 from physics_prior.dynamics.compose import GRAVITY
 from physics_prior.dynamics.covariance import add_rows
-from physics_prior.dynamics.kernel import kernel
+from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.dynamics.types import Array
 from physics_prior.estimation import bearing, ground, stance
@@ -23,12 +25,84 @@ from physics_prior.scene import Scene
 
 
 @kernel
-def carry_forced(F: Array, by_force: Array, forgotten: Array, U: Array, out: Array) -> None:
-    """Fill the first n rows of out (., n) with a factor U (n, n) carried; P = U^T U, everything transposed.
+def respond(
+    M: Array, D: Array, torques: Array, held: Array, passive: Array, noise: Array, response: Array, A: Array, B: Array
+) -> None:
+    """Fill response (nf, nv), accelerations M^-1 D per unknown force, and in noise (nf, nf) the torques that go with feet's.
 
-    F (2 nv, 2 nv) and by_force (nf, 2 nv): derivatives of (q, v); forgotten (nf,): that of each force by itself.
+    M (nv, nv), which is lost; D (nv, nf). noise comes as the diagonal of each force's own; the torques (k,) act on the freedoms
+    held, the passive (p,) are the others. A (p, p) and B (nv, nf) are scratch.
     """
-    n, m = U.shape[0], F.shape[0]
+    nv, nf = D.shape
+    for i in range(passive.shape[0]):
+        for j in range(passive.shape[0]):
+            A[i, j] = M[passive[i], passive[j]]
+        for j in range(nf):
+            B[i, j] = D[passive[i], j] * noise[j, j]
+    for k in range(torques.shape[0]):
+        for j in range(nf):
+            if j != torques[k]:
+                noise[torques[k], j] = -D[held[k], j] * noise[j, j]
+    factorize_dense(A)
+    solve_dense(A, B[: passive.shape[0]])
+    for k in range(torques.shape[0]):
+        for i in range(passive.shape[0]):
+            accumulate(M[held[k], passive[i]], B[i], noise[torques[k]])
+    copy(D, B)
+    factorize_dense(M)
+    solve_dense(M, B)
+    for j in range(nf):
+        for k in range(nv):
+            response[j, k] = B[k, j]
+
+
+@kernel
+def factorize_dense(A: Array) -> None:
+    """Replace a positive definite matrix (n, n), of which entries below the diagonal are read, by its lower Cholesky factor."""
+    for i in range(A.shape[0]):
+        for j in range(i + 1):
+            total = A[i, j]
+            for k in range(j):
+                total -= A[i, k] * A[j, k]
+            A[i, j] = total / A[j, j] if j < i else math.sqrt(total)
+
+
+@kernel
+def solve_dense(L: Array, B: Array) -> None:
+    """Replace right sides B (n, k) by their solutions; L: a lower Cholesky factor (n, n)."""
+    n = L.shape[0]
+    for i in range(n):
+        for k in range(i):
+            accumulate(-L[i, k], B[k], B[i])
+        _scale(1.0 / L[i, i], B[i])
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            accumulate(-L[k, i], B[k], B[i])
+        _scale(1.0 / L[i, i], B[i])
+
+
+@inline_kernel
+def _scale(s: float, out: Array) -> None:
+    """Multiply numbers."""
+    for c in range(out.shape[0]):
+        out[c] *= s
+
+
+@kernel
+def carry_forced(F: Array, response: Array, h: float, forgotten: Array, U: Array, by_force: Array, out: Array) -> None:
+    """Fill the first n rows of out (., n) with a factor U (n, n) carried by h seconds; P = U^T U, everything transposed.
+
+    F (2 nv, 2 nv): derivative of (q, v); response (nf, nv): accelerations by each force; forgotten (nf,): derivative of each by
+    itself; by_force (nf, 2 nv): filled with that of (q, v) by the forces.
+    """
+    n, m, nv = U.shape[0], F.shape[0], response.shape[1]
+    clear(by_force)
+    add_product(response, F[nv:], by_force)
+    for i in range(by_force.shape[0]):
+        for j in range(nv):
+            by_force[i, nv + j] += response[i, j]
+        for j in range(m):
+            by_force[i, j] *= 0.5 * h
     for i in range(n):
         row, own = out[i], U[i]
         add_rows(own[:m], F, row)
@@ -44,11 +118,7 @@ class ForcedProcess(OnManifold):
         super().__init__(scene, simulator, 2 * simulator.nv + simulator.unknown.count)
         self.unknown, self.nv = simulator.unknown, simulator.nv
         self._white = WhiteForces(scene, simulator)
-        passive = np.setdiff1d(np.arange(self.nv), self.unknown.freedoms)
-        self._passive, self._root = passive, np.ix_(passive, passive)
-        self._held = np.ix_(self.unknown.freedoms, passive)
-        self._under_feet = np.concatenate([np.arange(0), *(np.r_[foot.span] for foot in self.unknown.feet)])
-        self._counter = np.ix_(self.unknown.torques, self._under_feet)
+        self._passive = np.setdiff1d(np.arange(self.nv), self.unknown.freedoms)
         gravity = simulator.memory.parameters[:GRAVITY]
         self._weight = simulator.tree.mass * float(np.linalg.norm(gravity))
         self.scale = max(self._weight, 1.0)
@@ -75,18 +145,16 @@ class ForcedProcess(OnManifold):
         self.enter(state)
         M = self.simulator.mass_matrix(state.q)
         D = self.unknown.columns(self.simulator)
-        response = np.linalg.solve(M, D).T
         forgotten = np.exp(-h / self.unknown.time_constant)
-        noise = self._force_noise(state, M, D, h)
+        noise = np.diag(self.unknown.deviation * np.sqrt(1.0 - forgotten**2) * self._acting(state))
+        response, at = np.empty((nf, nv)), (self.unknown.torques, self.unknown.freedoms, self._passive)
+        respond(M, D, *at, noise, response, np.empty((len(self._passive), len(self._passive))), np.empty((nv, nf)))
         F, G = (each.T for each in self.simulator.linearise(state.q, state.v, h, self._white.factor(state)))
-        by_force = np.zeros((nf, 2 * nv))
-        add_product(response, F[nv:], by_force)
-        by_force[:, nv:] += response
         mean = self._mean(state)
         state.force = mean + forgotten * (state.force - mean)
         columns = 2 * nv if self._white.any else 0
         W = np.zeros((n + columns + nf, n))
-        carry_forced(F, 0.5 * h * by_force, forgotten, np.ascontiguousarray(factor.T), W)
+        carry_forced(F, response, h, forgotten, np.ascontiguousarray(factor.T), np.empty((nf, 2 * nv)), W)
         W[n : n + columns, : 2 * nv] = G[:columns]
         W[n + columns :, 2 * nv :] = noise.T
         return W.T
@@ -126,14 +194,3 @@ class ForcedProcess(OnManifold):
             if grounded:
                 mean[foot.span.start + 2] = self._weight / np.count_nonzero(state.grounded)
         return mean
-
-    def _force_noise(self, state: State, M: np.ndarray, D: np.ndarray, h: float) -> np.ndarray:
-        """(nf, nf) factor of the noise that a step of h seconds adds to the forces."""
-        own, feet = self.unknown, self._under_feet
-        deviation = own.deviation * np.sqrt(1.0 - np.exp(-2.0 * h / own.time_constant)) * self._acting(state)
-        noise = np.diag(deviation)
-        if len(own.torques):
-            pushed = D[:, feet] * deviation[feet]
-            moved = np.linalg.solve(M[self._root], pushed[self._passive])
-            noise[self._counter] = M[self._held] @ moved - pushed[own.freedoms]
-        return noise

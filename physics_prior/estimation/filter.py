@@ -18,6 +18,7 @@ from physics_prior.estimation.gain import gain_of
 from physics_prior.estimation.measurement import ForceMeasurement, Measurement, SwitchCommand, command_topic
 from physics_prior.estimation.observation import OBSERVERS, Innovation, Observer, check
 from physics_prior.estimation.process import Process, State, steps
+from physics_prior.estimation.square_root import with_first
 from physics_prior.scene import MeasurementSource, Scene
 
 ITERATIONS = 5  # of the update, where one linearisation does not do
@@ -151,10 +152,11 @@ class Filter:
         seen = self.innovation(measurement, prior.state)
         if len(seen.y) == 0:
             return self._fresh(prior)
-        U = np.ascontiguousarray(prior.factor.T)
+        U, seen_errors = np.ascontiguousarray(prior.factor.T), seen.H.shape[1]
         many, doubtful, partly = gated and len(seen.y) > seen.block, False, False
         if many:
-            believed = seen.squares(U) <= self.gate_limit(seen.block)
+            U = with_first(U, seen_errors)  # what is seen then depends on as many rows of U
+            believed = seen.squares(np.ascontiguousarray(U[:seen_errors, :seen_errors])) <= self.gate_limit(seen.block)
             doubtful = float(np.mean(believed)) < QUORUM
             partly = not (doubtful or believed.all())
             if partly:
@@ -175,7 +177,7 @@ class Filter:
         for _ in range(ITERATIONS - 1 if gain.largest >= SMALL_CORRECTION else 0):
             seen = self.innovation(measurement, state)
             seen = seen.kept(believed) if partly else seen
-            from_prior = self.process.difference(prior.state, state)[: seen.H.shape[1]]
+            from_prior = self.process.difference(prior.state, state)[:seen_errors]
             last = gain_of(U, replace(seen, y=seen.y + seen.H @ from_prior))
             state = self.process.displace(prior.state, last.correction)
             # of what is seen: the rest, rates and forces, goes with it

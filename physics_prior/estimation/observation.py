@@ -20,7 +20,6 @@ from physics_prior.dynamics.algebra import (
     transposed_times,
 )
 from physics_prior.dynamics.arrays import copy
-from physics_prior.dynamics.covariance import triangularise
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kinematics import point_jacobian
 from physics_prior.dynamics.rotation_vector import vector_of
@@ -78,12 +77,10 @@ class Innovation:
         return H, y
 
     def squares(self, U: np.ndarray) -> np.ndarray:
-        """(m / block,) normalised innovation squared of each block alone; the state's covariance is U^T U, U (n, n)."""
+        """(m / block,) normalised innovation squared of each block alone; U (h, h), triangular: these errors' P = U^T U."""
         out, h = np.empty(len(self.y) // self.block), self.H.shape[1]
-        own = np.array(U[:, self.first : self.first + h], order="C")
-        triangularise(own, h, np.empty(len(U) + h))
         T, scratch = np.empty((self.block + h, self.block)), np.empty(h + 2 * self.block)
-        block_squares(*self.whitened, own[:h], self.block, T, scratch, out)
+        block_squares(*self.whitened, U, self.block, T, scratch, out)
         return out
 
 

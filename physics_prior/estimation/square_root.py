@@ -30,6 +30,13 @@ def lower_factor(W: np.ndarray) -> np.ndarray:
     return T[:n].T
 
 
+def with_first(U: np.ndarray, count: int) -> np.ndarray:
+    """A factor (n, n) of the same covariance U^T U, triangular in its first columns: so many rows alone tell of these errors."""
+    out = U.copy()
+    triangularise(out, count, np.empty(2 * len(U)))
+    return out
+
+
 @kernel
 def innovate(
     U: Array, H: Array, first: int, noise: Array, y: Array, T: Array, scratch: Array, correction: Array

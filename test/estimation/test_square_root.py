@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from physics_prior.dynamics.covariance import carry_factor, triangularise
 from physics_prior.estimation.observation import Innovation
-from physics_prior.estimation.square_root import innovate, lower_factor, normalised_error
+from physics_prior.estimation.square_root import innovate, lower_factor, normalised_error, with_first
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -82,7 +82,7 @@ def test_update_is_the_dense_one(seed, n, m, unseen):
     joseph = (np.eye(n) - K @ full) @ P @ (np.eye(n) - K @ full).T + K @ R @ K.T
     conditioning = np.linalg.cond(innovation)
     assert nis == pytest.approx(y @ np.linalg.solve(innovation, y), rel=1e-13 * conditioning)
-    np.testing.assert_allclose(correction, K @ y, rtol=0, atol=1e-13 * conditioning * np.linalg.norm(K @ y))
+    np.testing.assert_allclose(correction, K @ y, rtol=0, atol=1e-13 * conditioning * np.linalg.norm(K) * np.linalg.norm(y))
     assert _relative(posterior @ posterior.T - joseph, P) < 1e-13 * conditioning
     assert determinant == pytest.approx(np.linalg.slogdet(innovation)[1], rel=1e-9, abs=1e-9)
 
@@ -95,6 +95,14 @@ def _frame(rng, n, blocks):
     return Innovation(rng.normal(size=3 * blocks), rng.normal(size=(3 * blocks, n - 1)), noise, 3)
 
 
+def _of_seen(seen, S):
+    """The triangular factor, transposed, of the errors that are seen."""
+    U, count = with_first(np.ascontiguousarray(S.T), seen.H.shape[1]), seen.H.shape[1]
+    np.testing.assert_allclose(U.T @ U, S @ S.T, rtol=1e-12, atol=1e-12 * np.max(S) ** 2)
+    assert not U[count:, :count].any()
+    return np.ascontiguousarray(U[:count, :count])
+
+
 @given(seeds, st.integers(2, 8), st.integers(1, 5))
 def test_blocks_are_whitened_and_judged_alone(seed, n, blocks):
     rng = np.random.default_rng(seed)
@@ -102,7 +110,7 @@ def test_blocks_are_whitened_and_judged_alone(seed, n, blocks):
     H, y = seen.whitened
     np.testing.assert_allclose(seen.noise @ H, seen.H, atol=1e-12)
     np.testing.assert_allclose(seen.noise @ y, seen.y, atol=1e-12)
-    squares = seen.squares(np.ascontiguousarray(S.T))
+    squares = seen.squares(_of_seen(seen, S))
     for k, square in enumerate(squares):
         rows = slice(3 * k, 3 * k + 3)
         spread = seen.H[rows] @ S[: n - 1]
@@ -114,7 +122,8 @@ def test_blocks_are_whitened_and_judged_alone(seed, n, blocks):
 def test_blocks_are_judged_however_little_is_known(seed):
     """Standard deviations of 1e12: what is measured says nothing against the state."""
     rng = np.random.default_rng(seed)
-    squares = _frame(rng, 6, 4).squares(1e12 * _factor(rng, 6, 0).T)
+    seen = _frame(rng, 6, 4)
+    squares = seen.squares(_of_seen(seen, 1e12 * _factor(rng, 6, 0)))
     assert np.all((squares >= 0.0) & (squares < 1e-6))
 
 

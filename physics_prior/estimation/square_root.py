@@ -11,7 +11,9 @@ from physics_prior.dynamics.arrays import accumulate, add_product, clear
 from physics_prior.dynamics.covariance import add_rows, triangularise
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.types import Array
+from physics_prior.estimation.blocked import scratch_size, triangularise_in_blocks
 
+MANY = 64  # errors; a factor of fewer is reduced as soon without blocks
 ROUNDING = 1e-10  # of the largest standard deviation: below it, another is that of a direction that constraints forbid
 
 
@@ -26,7 +28,10 @@ def lower_factor(W: np.ndarray) -> np.ndarray:
     """The lower factor (n, n) of W W^T; W (n, N >= n)."""
     n, N = W.shape
     T = np.array(W.T, order="C")
-    triangularise(T, n, np.empty(N + n))
+    if n < MANY:
+        triangularise(T, n, np.empty(N + n))
+    else:
+        triangularise_in_blocks(T, np.empty(scratch_size(N, n)))
     return T[:n].T
 
 

@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from physics_prior.dynamics.covariance import carry_factor, triangularise
 from physics_prior.estimation.observation import Innovation
-from physics_prior.estimation.square_root import innovate, lower_factor, normalised_error, with_first
+from physics_prior.estimation.square_root import MANY, innovate, lower_factor, normalised_error, with_first
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -54,6 +54,21 @@ def test_triangularise_keeps_the_square(seed, n, more):
     assert _relative(L @ L.T - W @ W.T, W @ W.T) < 1e-13  # 1e-15
 
 
+@given(seeds, st.integers(MANY, MANY + 5), st.integers(0, 9), st.integers(0, 9))
+def test_blocks_of_reflections_make_the_same_factor(seed, n, more, nothing):
+    """Of many errors; with rows of zeros at the end and columns without any error."""
+    rng = np.random.default_rng(seed)
+    T = np.concatenate([rng.normal(size=(n + more, n)), np.zeros((nothing, n))])
+    T[:, rng.permutation(n)[:nothing]] = 0.0
+    one_by_one = T.copy()
+    triangularise(one_by_one, n, np.empty(len(T) + n))
+    S = lower_factor(T.T)
+    assert not np.triu(S, 1).any()
+    np.testing.assert_allclose(S @ S.T, T.T @ T, atol=1e-12)
+    if not nothing:
+        np.testing.assert_allclose(S.T, one_by_one[:n], atol=1e-8)
+
+
 def test_triangularise_leaves_zero_rows_alone():
     W = lower_factor(np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 0.0]]))
     np.testing.assert_allclose(W @ W.T, [[0.0, 0.0], [0.0, 25.0]], atol=1e-15)
@@ -82,7 +97,9 @@ def test_update_is_the_dense_one(seed, n, m, unseen):
     joseph = (np.eye(n) - K @ full) @ P @ (np.eye(n) - K @ full).T + K @ R @ K.T
     conditioning = np.linalg.cond(innovation)
     assert nis == pytest.approx(y @ np.linalg.solve(innovation, y), rel=1e-13 * conditioning)
-    np.testing.assert_allclose(correction, K @ y, rtol=0, atol=1e-13 * conditioning * np.linalg.norm(K) * np.linalg.norm(y))
+    np.testing.assert_allclose(
+        correction, K @ y, rtol=0, atol=1e-13 * conditioning * np.linalg.norm(K) * np.linalg.norm(y)
+    )
     assert _relative(posterior @ posterior.T - joseph, P) < 1e-13 * conditioning
     assert determinant == pytest.approx(np.linalg.slogdet(innovation)[1], rel=1e-9, abs=1e-9)
 

@@ -18,7 +18,7 @@ from physics_prior.dynamics.manifold import difference
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.errors import SimulationError
 from physics_prior.estimation import events
-from physics_prior.estimation.square_root import lower_factor
+from physics_prior.estimation.square_root import lower_factor, reduced
 from physics_prior.scene import Scene
 
 
@@ -115,7 +115,7 @@ class OnManifold(ABC):
 
     def predict(self, state: State, factor: np.ndarray, h: float, count: int) -> np.ndarray:
         for _ in range(count):
-            factor = lower_factor(self.carry(state, factor, h))
+            factor = reduced(np.ascontiguousarray(self.carry(state, factor, h).T))
         if not all(np.isfinite(array).all() for array in (state.q, state.v, state.acceleration, factor)):
             raise SimulationError(f"the prediction is not finite after steps of {h:g} s: a smaller step size may do")
         return factor

@@ -26,8 +26,12 @@ def covariance_of(S: np.ndarray) -> np.ndarray:
 
 def lower_factor(W: np.ndarray) -> np.ndarray:
     """The lower factor (n, n) of W W^T; W (n, N >= n)."""
-    n, N = W.shape
-    T = np.array(W.T, order="C")
+    return reduced(np.array(W.T, order="C"))
+
+
+def reduced(T: np.ndarray) -> np.ndarray:
+    """The lower factor (n, n) of T^T T; T (N >= n, n) in C's order, which is lost."""
+    N, n = T.shape
     if n < MANY:
         triangularise(T, n, np.empty(N + n))
     else:

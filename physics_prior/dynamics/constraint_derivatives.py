@@ -142,7 +142,7 @@ def differentiate_rows(
     rows_v: Array,
     tau_q: Array,
 ) -> None:
-    """Fill the derivatives of all rows, and take those of A^T lambda from tau_q (nv, nv).
+    """Fill the derivatives of all rows, and add those of A^T lambda to tau_q (nv, nv).
 
     A (m, nv): the constraint Jacobian. A_q (m, nv): derivative of A v by q. rows_q, rows_v (m, nv): of the rows'
     accelerations at fixed vdot. Needs ``sweep`` and constrained accelerations; gaps (nv,) is scratch.
@@ -183,7 +183,7 @@ def differentiate_rows(
 def _differentiate_transmission(
     links: Records, pair: Record, freedom_records: Records, gaps: Records, force: Vector, tau_q: Array, base: Vector
 ) -> None:
-    """Subtract from tau_q the derivative of A^T lambda at fixed multipliers."""
+    """Add to tau_q the derivative of A^T lambda at fixed multipliers."""
     nv = gaps.shape[0]
     for side in range(2):
         sign = 2.0 * side - 1.0
@@ -203,7 +203,7 @@ def _differentiate_transmission(
                     else:
                         force_q = cross(get3(gap.turn), pushed)
                     moved = get3(gap.moved) if side == 1 else get3(gap.held)
-                    tau_q[k, n] -= dot(here, force_q) + dot(S[0], cross(moved, pushed))
+                    tau_q[k, n] += dot(here, force_q) + dot(S[0], cross(moved, pushed))
                 j = i
                 while j >= 0:
                     for e in range(freedoms(links[j].kind)):
@@ -211,6 +211,6 @@ def _differentiate_transmission(
                         if j == i and links[i].kind == FREE and c < 3:
                             continue  # the translation of a free joint carries its turn, not the reverse
                         S_up = get_spatial(freedom_records[n].S)
-                        tau_q[k, n] -= dot(at_point(cross_motion(S_up, S), p), pushed)
+                        tau_q[k, n] += dot(at_point(cross_motion(S_up, S), p), pushed)
                     j = links[j].parent
             i = links[i].parent

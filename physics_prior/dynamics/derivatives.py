@@ -7,6 +7,7 @@ counts as a translation that carries a ball joint. Forward dynamics follow from 
 import numpy as np
 
 from physics_prior.dynamics.algebra import (
+    ZERO,
     add3,
     cross,
     dot,
@@ -26,6 +27,7 @@ from physics_prior.dynamics.algebra import (
     times,
     transposed_times,
 )
+from physics_prior.dynamics.blocks import get_block, inner
 from physics_prior.dynamics.gyroscopic import middle_correction, turning_inertia
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import freedom, freedoms
@@ -37,7 +39,6 @@ from physics_prior.dynamics.spatial import (
     cross_motion,
     get_spatial,
     inertia_about,
-    power,
     put_spatial,
 )
 from physics_prior.dynamics.types import Array, Matrix, Record, Records, Spatial, Symmetric, Vector
@@ -48,11 +49,23 @@ FREEDOM = np.dtype(
         ("rate", "f8", 6),  # S_dot + psi_dot: what v does to the acceleration through it
         ("psi_dot", "f8", 6),  # V_parent x S
         ("psi_ddot", "f8", 6),  # A_parent x S + V_parent x psi_dot
+        (
+            "row",
+            "f8",
+            12,
+        ),  # what its generalized force owes to psi_dot and psi_ddot, or to S and rate, of one that carries it
+        ("column_q", "f8", 8),  # wrench by q that it asks of those that carry it; the last two are zero
+        ("column_v", "f8", 8),  # ... and by v
+        ("gain", "f8", 8),  # ... and per unit of its own force, through the articulated bodies (mass_factor.py)
+        ("inverse", "f8"),  # of its entry in D
         ("parent", "i8"),  # the degree of freedom that carries this one, -1 at the world
+        ("begin", "i8"),  # of the freedoms of its joint, of which a free one is two: a translation that carries a ball
+        ("end", "i8"),
+        ("last", "i8"),  # behind all that it carries
     ],
     align=True,
 )
-"""One degree of freedom as a spatial motion about the first link's origin."""
+"""One degree of freedom as a spatial motion about the first link's origin. Pairs that stand side by side are read as one."""
 
 COMPOSITE = np.dtype(
     [
@@ -105,6 +118,21 @@ def _turning_coriolis(inertia: Symmetric, omega: Vector) -> Matrix:
     return 2.0 * a[0], xy + z, xz - y, xy - z, 2.0 * a[4], yz + x, xz + y, yz - x, 2.0 * a[8]
 
 
+@inline_kernel
+def _tell_order(links: Records, i: int, c: int, record: Record) -> None:
+    """Fill where a freedom's joint begins and ends and what carries it."""
+    link = links[i]
+    first, count = link.v, freedoms(link.kind)
+    record.parent, record.last = first + c - 1, first + c + 1
+    record.begin, record.end = first, first + count
+    if link.kind == FREE:
+        record.begin, record.end = (first, first + 3) if c < 3 else (first + 3, first + 6)
+    if c == 0:
+        record.parent = -1
+        if link.parent >= 0:
+            record.parent = links[link.parent].v + freedoms(links[link.parent].kind) - 1
+
+
 @kernel
 def sweep(
     links: Records, work: Records, gravity: Array, step: float, freedom_records: Records, composites: Records
@@ -132,11 +160,7 @@ def sweep(
             V_up, A_up = get_spatial(composites[link.parent].V), get_spatial(composites[link.parent].A)
         for c in range(freedoms(link.kind)):
             record = freedom_records[link.v + c]
-            record.parent = link.v + c - 1
-            if c == 0:
-                record.parent = -1
-                if link.parent >= 0:
-                    record.parent = links[link.parent].v + freedoms(links[link.parent].kind) - 1
+            _tell_order(links, i, c, record)
             turn, shift = freedom(link.kind, here, c)
             S = (turn, plus(shift, cross(d, turn)))
             S_dot = cross_motion(V, S)
@@ -174,6 +198,10 @@ def sweep(
         )
         moment = plus(plus(symmetric_times(inertia, alpha), get3(here.gyroscopic)), cross(center, force))
         put_spatial(own.f, (moment, force))
+    for k in range(freedom_records.shape[0] - 1, 0, -1):
+        record = freedom_records[k]
+        if record.parent >= 0:
+            freedom_records[record.parent].last = max(freedom_records[record.parent].last, record.last)
     for i in range(links.shape[0] - 1, 0, -1):
         if links[i].parent >= 0:
             own, up = composites[i], composites[links[i].parent]
@@ -189,37 +217,52 @@ def sweep(
 
 @kernel
 def inverse_dynamics_derivatives(
-    links: Records, freedom_records: Records, composites: Records, tau_q: Array, tau_v: Array, M: Array
+    links: Records, freedom_records: Records, composites: Records, tau_q: Array, tau_v: Array, L: Array
 ) -> None:
-    """Fill the derivatives of inverse dynamics at fixed vdot, (nv, nv) each, after ``sweep``; no external forces.
+    """Fill the derivatives of inverse dynamics at fixed vdot, (nv, nv) each, NEGATED; no external forces.
 
-    Entries between branches are zero and left alone. M (nv, nv) gets the mass matrix below its diagonal.
+    Needs ``sweep`` and ``factorize_mass``. Entries between branches are zero and left alone. L (nv, nv) gets the factor of
+    the mass matrix below its diagonal.
     """
+    _ask(links, freedom_records, composites)
+    for k in range(freedom_records.shape[0]):
+        own = freedom_records[k]
+        row = get_block(own.row, 0, 12, 12)
+        column_q, column_v = get_block(own.column_q, 0, 8, 8), get_block(own.column_v, 0, 8, 8)
+        gain = get_block(own.gain, 0, 8, 8)
+        for n in range(own.begin, own.end):
+            by_psi, by_S = get_block(freedom_records[n].psi_dot, 0, 12, 12), get_block(freedom_records[n].S, 0, 12, 12)
+            tau_q[k, n], tau_v[k, n], L[k, n] = inner(by_psi, row), inner(by_S, row), inner(gain, by_S)
+        n = freedom_records[own.begin].parent
+        while n >= 0:
+            up = freedom_records[n]
+            by_psi, by_S = get_block(up.psi_dot, 0, 12, 12), get_block(up.S, 0, 12, 12)
+            tau_q[k, n], tau_v[k, n], L[k, n] = inner(by_psi, row), inner(by_S, row), inner(gain, by_S)
+            tau_q[n, k], tau_v[n, k] = inner(column_q, by_S), inner(column_v, by_S)
+            n = up.parent
+
+
+@inline_kernel
+def _ask(links: Records, freedom_records: Records, composites: Records) -> None:
+    """Fill what each freedom's motion asks of those that carry it, negated: inertial wrenches of all that it carries."""
     for i in range(links.shape[0]):
         link, own = links[i], composites[i]
         f = get_spatial(own.f)
         for c in range(freedoms(link.kind)):
-            k = link.v + c
-            record = freedom_records[k]
+            record = freedom_records[link.v + c]
             S, psi_dot = get_spatial(record.S), get_spatial(record.psi_dot)
             psi_ddot, rate = get_spatial(record.psi_ddot), get_spatial(record.rate)
-            row_B, momentum = _transposed_coriolis(own, S), _momentum(own, S)
+            put3(record.row[0:3], scale(-1.0, _transposed_coriolis(own, S)))
+            put3(record.row[3:6], ZERO)
+            put_spatial(record.row[6:12], _opposite(_momentum(own, S)))
             column_q = add(add(_coriolis(own, psi_dot), _momentum(own, psi_ddot)), cross_force(S, f))
-            column_v = add(_coriolis(own, S), _momentum(own, rate))
-            j = i
-            while j >= 0:
-                other = links[j]
-                for e in range(freedoms(other.kind)):
-                    translation_carries_ball = j == i and link.kind == FREE
-                    if translation_carries_ball and c < 3 and e >= 3:
-                        continue  # filled with the roles exchanged
-                    n = other.v + e
-                    up = freedom_records[n]
-                    S_up = get_spatial(up.S)
-                    tau_q[k, n] = dot(get3(up.psi_dot), row_B) + power(get_spatial(up.psi_ddot), momentum)
-                    M[k, n] = power(S_up, momentum)
-                    tau_v[k, n] = dot(S_up[0], row_B) + power(get_spatial(up.rate), momentum)
-                    if j != i or (translation_carries_ball and c >= 3 and e < 3):
-                        tau_q[n, k] = power(S_up, column_q)
-                        tau_v[n, k] = power(S_up, column_v)
-                j = other.parent
+            put_spatial(record.column_q[0:6], _opposite(column_q))
+            put_spatial(record.column_v[0:6], _opposite(add(_coriolis(own, S), _momentum(own, rate))))
+            for k in range(6, 8):
+                record.column_q[k], record.column_v[k], record.gain[k] = 0.0, 0.0, 0.0
+
+
+@inline_kernel
+def _opposite(f: Spatial) -> Spatial:
+    """The wrench -f."""
+    return scale(-1.0, f[0]), scale(-1.0, f[1])

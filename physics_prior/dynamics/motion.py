@@ -121,21 +121,17 @@ def differentiate(memory: Array, tangent: Array, q: Array, v: Array, step: float
     links, work, pairs, rows, _, _, spare, parameters = sections(memory)
     m, nv = row_count(rows), v.shape[0]
     derivative, matrices, scratch, freedoms, composites, gaps, _ = tangent_sections(tangent, links.shape[0], m, nv)
-    gravity, M, tau_q, tau_v = parameters[:3], matrices[0:nv], derivative[:, :nv], derivative[:, nv:]
+    gravity, L, tau_q, tau_v = parameters[:3], matrices[0:nv], derivative[:, :nv], derivative[:, nv:]
     clear(derivative)
     sweep(links, work, gravity, step, freedoms, composites)
-    inverse_dynamics_derivatives(links, freedoms, composites, tau_q, tau_v, M)
+    factorize_mass(links, work, freedoms)
+    inverse_dynamics_derivatives(links, freedoms, composites, tau_q, tau_v, L)
     A, A_q = matrices[nv : nv + m], matrices[nv + m : nv + 2 * m]
     rows_q, rows_v = matrices[nv + 2 * m : nv + 3 * m], matrices[nv + 3 * m : nv + 4 * m]
     if CONSTRAINED:
         differentiate_rows(links, work, pairs, freedoms, composites, gravity, gaps, A, A_q, rows_q, rows_v, tau_q)
-    for i in range(nv):
-        own = derivative[i]
-        for j in range(2 * nv):
-            own[j] = -own[j]
     differentiate_forces(parameters, links, work, freedoms, composites, q, v, tau_q, tau_v)
-    factorize_mass(freedoms, M)
-    solve_mass(freedoms, M, derivative)
+    solve_mass(freedoms, L, derivative)
     if CONSTRAINED:
         response, right, answer, change = correction_sections(scratch, m, nv, 2 * nv)
         responses(links, work, pairs, rows, spare[0], response)
@@ -241,10 +237,10 @@ def spread_noise(memory: Array, tangent: Array, force_noise: Array, h: float, G:
     links, _, _, rows, _, _, _, _ = sections(memory)
     m, nv = row_count(rows), force_noise.shape[0]
     _, matrices, scratch, freedoms, _, _, stages = tangent_sections(tangent, links.shape[0], m, nv)
-    columns, M = stages[0].reshape(-1)[: nv * nv].reshape(nv, nv), matrices[0:nv]
+    columns, L = stages[0].reshape(-1)[: nv * nv].reshape(nv, nv), matrices[0:nv]
     near, far, late = h * math.sqrt(h / 3.0), 0.5 * math.sqrt(3.0 * h), 0.5 * math.sqrt(h)
     copy(force_noise, columns)
-    solve_mass(freedoms, M, columns)
+    solve_mass(freedoms, L, columns)
     clear(G)
     for k in range(nv):
         for j in range(nv):

@@ -10,7 +10,8 @@ from functools import cached_property
 from typing import Any, ClassVar, cast
 
 import llvmlite.binding as llvm
-from numba.core import typed_passes, types, untyped_passes
+from numba import types
+from numba.core import ir, typed_passes, untyped_passes
 from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, CompileResult, compile_result
@@ -88,8 +89,28 @@ class _Lowering(typed_passes.NativeLowering):  # type: ignore[misc]
     """Lowering without counts of references, a quarter of the code: kernels allocate nothing, Python holds their arguments."""
 
     def run_pass(self, state: Any) -> bool:
+        _count_from_the_front(state)
         state.targetctx = state.targetctx.subtarget(enable_nrt=False)
         return cast(bool, super().run_pass(state))
+
+
+def _count_from_the_front(state: Any) -> None:
+    """Have variable indices taken as they are: Numba lets the negative count from the end, which costs three instructions."""
+    for statement in [each for block in state.func_ir.blocks.values() for each in block.body]:
+        access = statement.value if isinstance(statement, ir.Assign) else statement
+        if isinstance(access, ir.SetItem) or (isinstance(access, ir.Expr) and access.op == "getitem"):
+            signature = state.calltypes.pop(access)
+            array, index, *value = signature.args
+            if isinstance(array, types.Array):
+                index = _from_the_front(state.typemap[access.index.name])
+            state.calltypes[access] = signature.replace(args=(array, index, *value))
+
+
+def _from_the_front(index: Any) -> Any:
+    """The type of an index that knows no sign; of constants it is kept."""
+    if isinstance(index, types.BaseTuple):
+        return types.BaseTuple.from_types([_from_the_front(each) for each in index])
+    return types.uintp if index == types.intp else index
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)

@@ -100,10 +100,7 @@ def array_at(_typing_context: Any, array: Any, index: Any, shape: Any, dtype: An
 
 @inline_kernel
 def sections(memory: Array) -> Any:
-    """The sections of the memory, as kernels see them: links, work, pairs, rows, known, start, spare, parameters.
-
-    Bare arrays at addresses in the memory, which the caller holds: views would count references at 5 ns each.
-    """
+    """The sections of the memory, as kernels see them: links, work, pairs, rows, known, start, spare, parameters."""
     n, couples, m = int(memory[0]), int(memory[1]), int(memory[2])
     nq, nv = int(memory[3]), int(memory[4])
     a = HEAD + n * LINK_SIZE

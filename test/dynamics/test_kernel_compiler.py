@@ -6,9 +6,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from physics_prior.dynamics import algebra
+from physics_prior.dynamics.kernel import kernel
 
 KERNELS = '''
 import math
@@ -118,3 +120,12 @@ def test_another_checkout_of_the_same_sources_finds_what_is_compiled(tmp_path):
     folder, file = ran.stdout.split()
     assert Path(file).is_relative_to(tmp_path)
     assert folder == algebra.product._cache.cache_path
+
+
+@kernel
+def _corners(a, row):
+    return a[row, 0], a[row, -1], a[-1, 0], a[-1][-1]
+
+
+def test_constants_count_from_the_end_and_variables_from_the_front():
+    assert _corners(np.arange(6.0).reshape(2, 3), 1) == (3.0, 5.0, 3.0, 5.0)

@@ -13,13 +13,14 @@ from physics_prior.model import JointKind
 from physics_prior.scene import MarkerSet
 
 LEAST_NOISE = 1e-3  # m: cameras and labels leave as much
-UNKNOWN = 15.0  # rad/s^2 sqrt(s) and m/s^2 sqrt(s): accelerations by what is not modelled, muscles first of all
-BESIDE = 50.0  # rad/s^2 sqrt(s): accelerations of a joint by what is not modelled, where muscles are
+UNKNOWN = 10.0  # rad/s^2 sqrt(s) and m/s^2 sqrt(s): accelerations by what is not modelled, muscles first of all
+BESIDE = 15.0  # rad/s^2 sqrt(s): accelerations of a joint by what is not modelled, where muscles are
 MUSCLE = 3000.0  # rad/s^3 sqrt(s): jerk of a joint by its muscles
 CALM = ("neck", "shoulder", "elbow", "radioulnar", "wrist")  # joints that no landing foot shakes
-CALM_BESIDE, CALM_MUSCLE = 5.0, 100.0  # of these
+CALM_BESIDE, CALM_MUSCLE = 4.0, 50.0  # of these
 CONSTANT = 1.0  # s, over which torques of muscles and forces of the ground are forgotten
 VERTICAL, HORIZONTAL, MOMENT = 1.0, 0.2, 0.08  # of the ground's force, of the weight; of its moment, m of the weight
+GATE = 0.999999  # of markers: skin that drifts stays off for tenths of a second, and its segment would go astray without it
 TONE = 10.0  # 1/s: what joints that no marker tells come to rest by
 
 
@@ -81,6 +82,7 @@ noise:
 {_white(found, ease, forces)}
   jerk: 300
   velocity: 2
+gate: {{probability: {GATE}}}  # skin drifts: wrong labels are further off
 step: {{size: 5 ms}}
 initial:
   positions:

@@ -17,7 +17,6 @@ from physics_prior.studies.effects.likelihood import read_measurements
 BAG = Path(__file__).resolve().parents[2].parent / "shared" / "bags" / "lemouel_stand_walk"
 ADDED = 0.003  # m
 GAP, SWAP, EVERY = 0.3, 0.1, 0.8  # s
-GATE = chi2.ppf(0.999, 3)
 
 pytestmark = pytest.mark.skipif(not BAG.is_dir(), reason=f"missing {BAG}")
 
@@ -71,22 +70,30 @@ def bad_day(name: str) -> tuple[int, set[Level], float, float, int]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "slack"),
-    [
-        ("walk_lemouel_tracking", 0.0),  # measured: 8.1 mm, 0.990
-        ("walk_lemouel", 0.02),  # 24.0 mm, 0.971; of seeds 1 to 4 14.2 to 21.8 mm, 0.965 to 0.975
-    ],
-)
-def test_a_bad_day_does_not_lose_the_walker(name, slack):
-    """Gaps are bridged, and innovations are as large as expected of the noise, gated ones left out.
-
-    With forces they are smaller, by a slack that is not wanted: what skin does while one stands still is in the noise.
-    """
+@pytest.mark.parametrize("name", ["walk_lemouel_tracking", "walk_lemouel"])  # measured: 6.4 mm, 0.999; 13.7 mm, 1.003
+def test_a_bad_day_does_not_lose_the_walker(name):
+    """Gaps are bridged, and innovations are as large as expected of the noise, gated ones left out."""
     starts, levels, error, ratio, rows = bad_day(name)
     assert starts == 1  # never started anew
     assert levels == {Level.OK}
     assert error < 0.025
-    # what passes the gate of 0.999 has a mean of 0.995 of what all had; the 95 % band of as many rows
-    expected, band = chi2.cdf(GATE, 5) / chi2.cdf(GATE, 3), 1.96 * np.sqrt(2.0 / rows)
-    assert expected - band - slack <= ratio <= expected + band
+    # what passes the gate has a little less than the mean of what all had; the 95 % band of as many rows
+    gate = chi2.ppf(load_scene(name).gate.probability, 3)
+    expected, band = chi2.cdf(gate, 5) / chi2.cdf(gate, 3), 1.96 * np.sqrt(2.0 / rows)
+    assert expected - band <= ratio <= expected + band
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["walk_lemouel_tracking", "walk_lemouel"])
+def test_skin_that_drifts_does_not_take_a_segment_with_it(name):
+    """Shoulders leave the rigid trunk by a centimetre at 4.1 s: refused one by one, their markers left it 5 cm astray."""
+    scene = load_scene(name)
+    frames = read_measurements(BAG, scene)
+    frames = [each for each in frames if 3.6e9 < each.stamp - frames[0].stamp < 4.7e9]
+    estimator = Estimator(scene)
+    trunk = [marker.part == "thorax" for marker in scene.measurements[0].markers]
+    for frame in frames:
+        estimator.add(frame)
+        posterior = estimator.history.nodes[-1].posterior
+        error = estimator.filter.innovation(frame, posterior.state).y.reshape(-1, 3)
+        assert np.max(np.linalg.norm(error[trunk], axis=1)) < 0.015  # measured: 12.2 and 12.5 mm

@@ -92,8 +92,12 @@ def test_skin_that_drifts_does_not_take_a_segment_with_it(name):
     frames = [each for each in frames if 3.6e9 < each.stamp - frames[0].stamp < 4.7e9]
     estimator = Estimator(scene)
     trunk = [marker.part == "thorax" for marker in scene.measurements[0].markers]
+    worst = []
     for frame in frames:
         estimator.add(frame)
-        posterior = estimator.history.nodes[-1].posterior
-        error = estimator.filter.innovation(frame, posterior.state).y.reshape(-1, 3)
-        assert np.max(np.linalg.norm(error[trunk], axis=1)) < 0.015  # measured: 12.2 and 12.5 mm
+        if estimator.ready:
+            posterior = estimator.history.nodes[-1].posterior
+            error = estimator.filter.innovation(frame, posterior.state).y.reshape(-1, 3)
+            worst.append(np.max(np.linalg.norm(error[trunk], axis=1)))
+    assert len(worst) >= len(frames) - 1
+    assert max(worst) < 0.015  # measured: 12.2 and 12.5 mm

@@ -58,6 +58,11 @@ def _users_package(file: Path) -> Path | None:
     return top if (top / "__init__.py").is_file() and top != _PACKAGE else None
 
 
+def is_own(file: Path) -> bool:
+    """Whether a file with kernels is of this package, or a step that was composed of it; else it is a user's."""
+    return file.is_relative_to(_PACKAGE) or file.is_relative_to(cache_directory())
+
+
 def within(folder: Path, decorate: Callable[[], Any]) -> Any:
     """What a decorator of Numba's own returns, which reads where its cache is when it decorates."""
     before = numba.config.CACHE_DIR

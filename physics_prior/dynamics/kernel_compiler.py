@@ -7,6 +7,7 @@ machine code, once, with all that they call. Dispatchers, passes and code librar
 
 from collections.abc import Callable
 from functools import cached_property
+from pathlib import Path
 from typing import Any, ClassVar, cast
 
 import llvmlite.binding as llvm
@@ -20,7 +21,7 @@ from numba.core.environment import lookup_environment
 from numba.core.errors import LoweringError
 from numba.core.registry import CPUDispatcher
 
-from physics_prior.dynamics.kernel_cache import KernelCache
+from physics_prior.dynamics.kernel_cache import KernelCache, is_own
 
 ALLOCATES = "NRT_MemInfo_alloc"
 
@@ -89,13 +90,14 @@ class _Lowering(typed_passes.NativeLowering):  # type: ignore[misc]
     """Lowering without counts of references, a quarter of the code: kernels allocate nothing, Python holds their arguments."""
 
     def run_pass(self, state: Any) -> bool:
-        _count_from_the_front(state)
+        if is_own(Path(state.func_id.filename)):
+            _count_from_the_front(state)
         state.targetctx = state.targetctx.subtarget(enable_nrt=False)
         return cast(bool, super().run_pass(state))
 
 
 def _count_from_the_front(state: Any) -> None:
-    """Have variable indices taken as they are: Numba lets the negative count from the end, which costs three instructions."""
+    """Have variable indices, none of which is negative, taken as they are: to count from the end costs three instructions."""
     for statement in [each for block in state.func_ir.blocks.values() for each in block.body]:
         access = statement.value if isinstance(statement, ir.Assign) else statement
         if isinstance(access, ir.SetItem) or (isinstance(access, ir.Expr) and access.op == "getitem"):

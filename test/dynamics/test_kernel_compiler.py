@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from physics_prior.dynamics import algebra
+from physics_prior.dynamics import algebra, kernel_compiler
 from physics_prior.dynamics.kernel import kernel
 
 KERNELS = '''
@@ -127,5 +127,16 @@ def _corners(a, row):
     return a[row, 0], a[row, -1], a[-1, 0], a[-1][-1]
 
 
-def test_constants_count_from_the_end_and_variables_from_the_front():
+@kernel
+def _at(a, row, column):
+    return a[row, column], a[row][column]
+
+
+def test_constant_indices_of_own_kernels_count_from_the_end(monkeypatch):
+    monkeypatch.setattr(kernel_compiler, "is_own", lambda file: True)
     assert _corners(np.arange(6.0).reshape(2, 3), 1) == (3.0, 5.0, 3.0, 5.0)
+
+
+def test_any_index_of_a_users_kernel_counts_from_the_end():
+    """Own kernels have no negative ones but constants; a user may."""
+    assert _at(np.arange(6.0).reshape(2, 3), -1, -2) == (4.0, 4.0)

@@ -92,12 +92,12 @@ def _turn_back(simulator: "Simulator", q: np.ndarray, index: int) -> None:
     """Turn what an effect holds, in the mass metric, until its levers point where they should."""
     effect, (first, last) = simulator.switches.effects[index], simulator.switches.spans[index]
     assert isinstance(effect, Holding)
+    from scipy.spatial.transform import Rotation  # here: few need it, and it takes long to load
+
     still, origin, pairs = np.zeros(simulator.nv), np.zeros(3), simulator.memory.pairs
     for _ in range(STEPS):
         simulator.constraint_error(q, still)
         a, b = (pairs[name][first + 1 : last] - pairs[name][first] for name in ("a", "b"))
-        from scipy.spatial.transform import Rotation  # here: few need it, and it takes long to load
-
         turn = Rotation.align_vectors(a, b)[0].as_rotvec()
         angle = float(np.linalg.norm(turn))
         if angle < NEAR:

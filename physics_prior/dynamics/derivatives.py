@@ -49,11 +49,7 @@ FREEDOM = np.dtype(
         ("rate", "f8", 6),  # S_dot + psi_dot: what v does to the acceleration through it
         ("psi_dot", "f8", 6),  # V_parent x S
         ("psi_ddot", "f8", 6),  # A_parent x S + V_parent x psi_dot
-        (
-            "row",
-            "f8",
-            12,
-        ),  # what its generalized force owes to psi_dot and psi_ddot, or to S and rate, of one that carries it
+        ("row", "f8", 12),  # what its force owes to psi_dot and psi_ddot, or to S and rate, of one that carries it
         ("column_q", "f8", 8),  # wrench by q that it asks of those that carry it; the last two are zero
         ("column_v", "f8", 8),  # ... and by v
         ("gain", "f8", 8),  # ... and per unit of its own force, through the articulated bodies (mass_factor.py)

@@ -35,11 +35,12 @@ def factorize_square(matrix: Array, pivots: Array) -> None:
 def solve_square(factors: Array, pivots: Array, columns: Array) -> None:
     """Replace columns (n, k) by the solutions of the system that ``factorize_square`` left."""
     n, width = columns.shape
-    for k in range(n):
+    for k in range(n):  # all of them first: L stands in the order that they lead to
         best = int(pivots[k])
         if best != k:
             for c in range(width):
                 columns[k, c], columns[best, c] = columns[best, c], columns[k, c]
+    for k in range(n):
         for i in range(k + 1, n):
             share = factors[i, k]
             for c in range(width):

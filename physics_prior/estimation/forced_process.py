@@ -9,14 +9,13 @@ Muscles hold the posture against what the ground does: the noise of a foot's wre
 accelerations of the joints as they are, so that a surprise under the foot moves the whole body, not the foot alone.
 """
 
-import math
-
 import numpy as np
 
 from physics_prior.dynamics.arrays import accumulate, add_product, clear, copy
 from physics_prior.dynamics.compose import GRAVITY
 from physics_prior.dynamics.covariance import add_rows
-from physics_prior.dynamics.kernel import inline_kernel, kernel
+from physics_prior.dynamics.kernel import kernel
+from physics_prior.dynamics.linear_solve import factorize_square, solve_square
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.dynamics.types import Array
 from physics_prior.estimation import bearing, ground, stance
@@ -26,12 +25,21 @@ from physics_prior.scene import Scene
 
 @kernel
 def respond(
-    M: Array, D: Array, torques: Array, held: Array, passive: Array, noise: Array, response: Array, A: Array, B: Array
+    M: Array,
+    D: Array,
+    torques: Array,
+    held: Array,
+    passive: Array,
+    noise: Array,
+    response: Array,
+    A: Array,
+    B: Array,
+    pivots: Array,
 ) -> None:
     """Fill response (nf, nv), accelerations M^-1 D per unknown force, and in noise (nf, nf) the torques that go with feet's.
 
     M (nv, nv), which is lost; D (nv, nf). noise comes as the diagonal of each force's own; the torques (k,) act on the freedoms
-    held, the passive (p,) are the others. A (p, p) and B (nv, nf) are scratch.
+    held, the passive (p,) are the others. A (p, p), B (nv, nf) and pivots (nv,) are scratch.
     """
     nv, nf = D.shape
     for i in range(passive.shape[0]):
@@ -43,49 +51,17 @@ def respond(
         for j in range(nf):
             if j != torques[k]:
                 noise[torques[k], j] = -D[held[k], j] * noise[j, j]
-    factorize_dense(A)
-    solve_dense(A, B[: passive.shape[0]])
+    factorize_square(A, pivots)
+    solve_square(A, pivots, B[: passive.shape[0]])
     for k in range(torques.shape[0]):
         for i in range(passive.shape[0]):
             accumulate(M[held[k], passive[i]], B[i], noise[torques[k]])
     copy(D, B)
-    factorize_dense(M)
-    solve_dense(M, B)
+    factorize_square(M, pivots)
+    solve_square(M, pivots, B)
     for j in range(nf):
         for k in range(nv):
             response[j, k] = B[k, j]
-
-
-@kernel
-def factorize_dense(A: Array) -> None:
-    """Replace a positive definite matrix (n, n), of which entries below the diagonal are read, by its lower Cholesky factor."""
-    for i in range(A.shape[0]):
-        for j in range(i + 1):
-            total = A[i, j]
-            for k in range(j):
-                total -= A[i, k] * A[j, k]
-            A[i, j] = total / A[j, j] if j < i else math.sqrt(total)
-
-
-@kernel
-def solve_dense(L: Array, B: Array) -> None:
-    """Replace right sides B (n, k) by their solutions; L: a lower Cholesky factor (n, n)."""
-    n = L.shape[0]
-    for i in range(n):
-        for k in range(i):
-            accumulate(-L[i, k], B[k], B[i])
-        _scale(1.0 / L[i, i], B[i])
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            accumulate(-L[k, i], B[k], B[i])
-        _scale(1.0 / L[i, i], B[i])
-
-
-@inline_kernel
-def _scale(s: float, out: Array) -> None:
-    """Multiply numbers."""
-    for c in range(out.shape[0]):
-        out[c] *= s
 
 
 @kernel
@@ -147,8 +123,9 @@ class ForcedProcess(OnManifold):
         D = self.unknown.columns(self.simulator)
         forgotten = np.exp(-h / self.unknown.time_constant)
         noise = np.diag(self.unknown.deviation * np.sqrt(1.0 - forgotten**2) * self._acting(state))
-        response, at = np.empty((nf, nv)), (self.unknown.torques, self.unknown.freedoms, self._passive)
-        respond(M, D, *at, noise, response, np.empty((len(self._passive), len(self._passive))), np.empty((nv, nf)))
+        response, at, passive = np.empty((nf, nv)), (self.unknown.torques, self.unknown.freedoms), len(self._passive)
+        scratch = np.empty((passive, passive)), np.empty((nv, nf)), np.empty(nv)
+        respond(M, D, *at, self._passive, noise, response, *scratch)
         F, G = (each.T for each in self.simulator.linearise(state.q, state.v, h, self._white.factor(state)))
         mean = self._mean(state)
         state.force = mean + forgotten * (state.force - mean)

@@ -72,19 +72,10 @@ def innovate(
             row[m + j] = own[j]
         add_rows(own[first:end], H, row)
     triangularise(T, m, scratch)
-    nis, determinant = 0.0, 0.0
-    for j in range(n):
-        correction[j] = 0.0
+    nis, determinant = whiten_by(T, y, scratch)
+    clear(correction)
     for i in range(m):
-        white = y[i]
-        for j in range(i):
-            white -= T[j, i] * scratch[j]
-        white /= T[i, i]
-        scratch[i] = white
-        nis += white * white
-        determinant += 2.0 * math.log(T[i, i])
-        for j in range(n):
-            correction[j] += white * T[i, m + j]
+        accumulate(scratch[i], T[i, m:], correction)
     largest = 0.0
     for j in range(first, end):
         largest = max(largest, abs(correction[j]))
@@ -106,15 +97,7 @@ def correct(
     for k in range(n):
         add_rows(U[k, first : first + h], H, T[m + k])
     triangularise(T, m, scratch)
-    nis, determinant = 0.0, 0.0
-    for i in range(m):
-        white = y[i]
-        for j in range(i):
-            white -= T[j, i] * scratch[j]
-        white /= T[i, i]
-        scratch[i] = white
-        nis += white * white
-        determinant += 2.0 * math.log(T[i, i])
+    nis, determinant = whiten_by(T, y, scratch)
     for i in range(m - 1, -1, -1):
         for j in range(i + 1, m):
             scratch[i] -= T[i, j] * scratch[j]
@@ -134,6 +117,21 @@ def correct(
     for j in range(first, first + h):
         largest = max(largest, abs(correction[j]))
     return nis, determinant, largest
+
+
+@kernel
+def whiten_by(T: Array, y: Array, out: Array) -> tuple[float, float]:
+    """Fill the first m of out with R^-T y, y (m,), R upper in T (m, m): return its square, and the logarithm of det R^T R."""
+    nis, determinant = 0.0, 0.0
+    for i in range(y.shape[0]):
+        white = y[i]
+        for j in range(i):
+            white -= T[j, i] * out[j]
+        white /= T[i, i]
+        out[i] = white
+        nis += white * white
+        determinant += 2.0 * math.log(T[i, i])
+    return nis, determinant
 
 
 @kernel

@@ -6,11 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from physics_prior.dynamics import algebra, kernel_compiler
-from physics_prior.dynamics.kernel import kernel
+from physics_prior.dynamics import algebra
+from physics_prior.dynamics.kernel_cache import cache_directory, is_own
 
 KERNELS = '''
 import math
@@ -122,21 +121,16 @@ def test_another_checkout_of_the_same_sources_finds_what_is_compiled(tmp_path):
     assert folder == algebra.product._cache.cache_path
 
 
-@kernel
-def _corners(a, row):
-    return a[row, 0], a[row, -1], a[-1, 0], a[-1][-1]
-
-
-@kernel
-def _at(a, row, column):
-    return a[row, column], a[row][column]
-
-
-def test_constant_indices_of_own_kernels_count_from_the_end(monkeypatch):
-    monkeypatch.setattr(kernel_compiler, "is_own", lambda file: True)
-    assert _corners(np.arange(6.0).reshape(2, 3), 1) == (3.0, 5.0, 3.0, 5.0)
-
-
-def test_any_index_of_a_users_kernel_counts_from_the_end():
-    """Own kernels have no negative ones but constants; a user may."""
-    assert _at(np.arange(6.0).reshape(2, 3), -1, -2) == (4.0, 4.0)
+def test_own_kernels_take_variable_indices_as_they_are_and_users_count_from_the_end(use):
+    assert is_own(Path(algebra.__file__))
+    assert is_own(cache_directory() / "step_0.py")
+    assert not is_own(Path(__file__))
+    corners = "@kernel\ndef corners(a, row):\n    return a[row, 0], a[row, -1], a[-1, 0], a[-1][-1]\n"
+    at = "@kernel\ndef at(a, row, column):\n    return a[row, column], a[row][column]\n"
+    own = "import physics_prior.dynamics.kernel_compiler as compiler\ncompiler.is_own = lambda file: True\n"
+    told = use(
+        f"a = np.arange(6.0).reshape(2, 3)\n{at}print(at(a, -1, -2))\n{own}{corners}print(corners(a, 1))\n"
+        # what comes before the first row: the end of another, where the array is a part of one
+        f"{at.replace('at(', 'there(')}print(there(np.arange(12.0).reshape(4, 3)[2:], -1, 1))\n"
+    )
+    assert told.splitlines() == ["(4.0, 4.0)", "(3.0, 5.0, 3.0, 5.0)", "(4.0, 4.0)"]

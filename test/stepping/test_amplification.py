@@ -1,39 +1,28 @@
 """Steps that follow a stiff scene are told from those that do not, and a motion that diverges by itself is no reason."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from physics_prior.scene import load_scene
+from physics_prior.effects.joint_damping import JointDamping
+from physics_prior.scene import Step, load_scene
 from physics_prior.stepping import stable
-
-PENDULUM = """
-description: A pendulum in honey.
-model:
-  parts:
-    rod:
-      mass: 1 kg
-      center_of_mass: [0, 0, -0.5]
-      inertia: {rod: 1 m}
-      joint: {kind: revolute, axis: [0, 1, 0], name: pivot}
-effects:
-  - gravity
-  - joint_damping: {coefficients: {pivot: DAMPING N m s/rad}}
-initial:
-  positions: {pivot: ANGLE}
-step: {size: 10 ms, integrator: INTEGRATOR}
-"""
 
 
 @pytest.fixture
-def honey(tmp_path):
-    """`honey(rate, angle, integrator) -> scene`, whose speed decays at that rate, 1/s."""
+def honey():
+    """`honey(rate, angle, integrator) -> scene`: a pendulum whose speed decays at that rate, 1/s."""
 
-    def scene(rate, angle="0 deg", integrator="rk4"):
-        text = PENDULUM.replace("DAMPING", f"{rate / 3.0:.17g}").replace(
-            "ANGLE", angle
-        )  # inertia about the pivot: 1/3 kg m^2
-        (tmp_path / "honey.yaml").write_text(text.replace("INTEGRATOR", integrator))
-        return load_scene(tmp_path / "honey.yaml")
+    def scene(rate, angle=0.0, integrator="rk4"):
+        pendulum = load_scene("pendulum")
+        damping = JointDamping(coefficients={"pivot": rate / 3.0})  # the inertia about the pivot is 1/3 kg m^2
+        return replace(
+            pendulum,
+            effects=(*pendulum.effects, damping),
+            initial=replace(pendulum.initial, q=np.array([angle]), v=np.zeros(1)),
+            step=Step(integrator=integrator, size=0.01),
+        )
 
     return scene
 
@@ -54,7 +43,7 @@ def test_a_step_follows_up_to_the_end_of_its_integrators_stability(honey, rate, 
 
 
 def test_a_motion_that_falls_over_is_followed_all_the_same(honey):
-    scene = honey(0.0, angle="180 deg")
+    scene = honey(0.0, angle=np.pi)
     simulator = scene.simulator()
     assert stable(simulator, scene.initial.q, scene.initial.v, 0.2)  # errors grow by 2.1 in it
     assert simulator.time == 0.0

@@ -1,32 +1,33 @@
-"""Whether every joint moves an inertia: one that does not has no acceleration."""
+"""Whether every joint moves an inertia: one that does not has no acceleration.
 
-from typing import TYPE_CHECKING
+By the textbook's formulas in NumPy: a few postures once a scene are not worth a kernel, which takes half a second to compile.
+"""
 
 import numpy as np
 
+from physics_prior import rotations
+from physics_prior.dynamics.formulations.generalized import mass_matrix
+from physics_prior.dynamics.formulations.kinematics import kinematics
 from physics_prior.errors import ModelError
-from physics_prior.model import JointKind
+from physics_prior.model import JointKind, Tree
 from physics_prior.model.tree import Link
-
-if TYPE_CHECKING:
-    from physics_prior.dynamics.simulator import Simulator
 
 SINGULAR = 1e-13  # least eigenvalue of the scaled mass matrix: below, a joint moves nothing
 ROUNDING = 1e-15  # of the largest moment about a joint: below, a moment is zero
 POSTURES = 3
 
 
-def check_inertia(simulator: "Simulator") -> None:
+def check_inertia(tree: Tree) -> None:
     """Refuse joints that move no inertia, in any of a few postures (a point mass on a joint's axis, say).
 
     Raises:
         ModelError: names the degree of freedom.
     """
-    tree, rng, worst = simulator.tree, np.random.default_rng(0), None
+    rng, worst = np.random.default_rng(0), None
     for _ in range(POSTURES):
         q = tree.integrate(tree.neutral(), rng.normal(size=tree.nv))
-        M = simulator.mass_matrix(q)
-        inertia, moments = np.diag(M), _moments(simulator)
+        M = mass_matrix(tree, q)
+        inertia, moments = np.diag(M), _moments(tree, q)
         lacking = [k for link, moment in zip(tree.links, moments, strict=True) for k in _idle(inertia, link, moment)]
         if lacking:
             worst = lacking[0]
@@ -51,14 +52,14 @@ def _idle(inertia: np.ndarray, link: Link, moment: float) -> list[int]:
     return [k for k in turning if not inertia[k] > ROUNDING * largest]
 
 
-def _moments(simulator: "Simulator") -> np.ndarray:
-    """(links,) the polar moment of all that each carries about its joint, kg m^2: no axis has more; needs ``move``."""
-    links, work = simulator.memory.links, simulator.memory.work
-    moments = np.zeros(len(links))
-    for i, link in enumerate(links):
-        carrier = i
+def _moments(tree: Tree, q: np.ndarray) -> np.ndarray:
+    """(links,) the polar moment of all that each carries about its joint at q, kg m^2: no axis has more."""
+    pose, moments = kinematics(tree, q, np.zeros(tree.nv)), np.zeros(len(tree.links))
+    for i, link in enumerate(tree.links):
+        own, carrier = link.mass_properties, i
+        center = pose.position[i] + rotations.rotate(pose.orientation[i], own.center_of_mass)
         while carrier >= 0:
-            arm = work[i]["origin"] + work[i]["center"] - work[carrier]["origin"]
-            moments[carrier] += link["inertia"][[0, 3, 5]].sum() + link["mass"] * (arm @ arm)
-            carrier = int(links[carrier]["parent"])
+            arm = center - pose.position[carrier]
+            moments[carrier] += np.trace(own.inertia) + own.mass * (arm @ arm)
+            carrier = tree.links[carrier].parent
     return moments

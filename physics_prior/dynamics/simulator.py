@@ -119,7 +119,7 @@ class Simulator:
         self._stores = any(effect.compiled is not None and effect.compiled.energy is not None for effect in effects)
         self._posed = np.zeros(self.nq)
         self.switches = Switches(self, {label: (first, last) for label, first, last in labels})
-        check_inertia(self)
+        check_inertia(tree)
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray | None = None) -> np.ndarray:
         """(nv,) vdot at q and v under the effects and generalized forces tau (nv,); fills ``rank``.

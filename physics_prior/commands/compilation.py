@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from physics_prior.commands.terminal import progress, status
-from physics_prior.dynamics.compose import kinds_of_rows, step_module
+from physics_prior.dynamics.compose import step_module, structure_of
 from physics_prior.dynamics.kernel_cache import cache_directory
 from physics_prior.scene import Scene, load_scene
 from physics_prior.stepping import Choice, settle
@@ -27,10 +27,10 @@ def load_settled(name_or_path: str | Path) -> tuple[Scene, Choice | None]:
 @contextmanager
 def compiling(scene: Scene, last: Literal["advance", "carry"]) -> Iterator[None]:
     """Say what is going on while the block makes the first use of a scene's step; last: what it compiles last of that."""
-    constrained, touching = kinds_of_rows(scene.tree, scene.effects)
+    structure = structure_of(scene.tree, scene.effects)
     sleeping = scene.step.sleep is not None and last == "advance"  # the estimator's simulator knows no sleep
-    step = step_module(scene.effects, constrained, scene.step.integrator, touching, sleeping)
+    step = step_module(scene.effects, structure, scene.step.integrator, sleeping)
     cached = any(cache_directory().glob(f"*/{step.__name__}.{getattr(step, last).__name__}-*.nbc"))
-    duration = WITH_CONTACT if touching else DURATION
+    duration = WITH_CONTACT if structure.touching else DURATION
     with status(f"loading {scene.name}" if cached else f"compiling the step of {scene.name}, once: {duration}"):
         yield

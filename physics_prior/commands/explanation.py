@@ -10,7 +10,7 @@ from rich.table import Table
 
 from physics_prior.commands.compilation import compiling
 from physics_prior.commands.terminal import console, table
-from physics_prior.dynamics.compose import kinds_of_rows, step_source
+from physics_prior.dynamics.compose import step_source, structure_of
 from physics_prior.dynamics.contact.geometry.manifold import SLOTS
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects import Effect
@@ -89,8 +89,8 @@ def scene_figures(scene: Scene, costs: Sequence[float] | None = None, choice: Ch
 
 def step_text(scene: Scene) -> str:
     """The source of the scene's compiled step."""
-    constrained, touching = kinds_of_rows(scene.tree, scene.effects)
-    return step_source(scene.effects, constrained, scene.step.integrator, touching, scene.step.sleep is not None)
+    structure = structure_of(scene.tree, scene.effects)
+    return step_source(scene.effects, structure, scene.step.integrator, scene.step.sleep is not None)
 
 
 def _model(scene: Scene) -> Table:

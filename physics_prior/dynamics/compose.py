@@ -10,12 +10,14 @@ sources.
 import ast
 import hashlib
 import importlib.util
+import math
 import os
 import sys
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from types import ModuleType
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -29,7 +31,7 @@ from physics_prior.dynamics.records import LINK, WORK
 from physics_prior.dynamics.types import Array
 from physics_prior.effects.effect import Effect
 from physics_prior.errors import ModelError
-from physics_prior.model import Tree
+from physics_prior.model import JointKind, Tree
 
 ROOM = "physics_prior.dynamics"
 GRAVITY = 3  # numbers at the head of the parameters
@@ -75,22 +77,35 @@ def section(parameters: Array, index: int) -> Array:
     return parameters[int(parameters[GRAVITY + index]) : int(parameters[GRAVITY + index + 1])]
 
 
-def kinds_of_rows(tree: Tree, effects: Sequence[Effect]) -> tuple[bool, bool]:
-    """Whether effects give the step equality rows, and inequality rows."""
-    constrained = any(effect.point_pairs(tree) for effect in effects)
-    return constrained, any(effect.touching_pairs(tree) or effect.joint_ranges(tree) for effect in effects)
+class Structure(NamedTuple):
+    """What a scene calls for beside effects that push.
+
+    Attributes:
+        constrained: equality rows.
+        touching: inequality rows.
+        free: no joints, as all parts are free bodies, which do not touch either.
+    """
+
+    constrained: bool = False
+    touching: bool = False
+    free: bool = False
+
+
+def structure_of(tree: Tree, effects: Sequence[Effect]) -> Structure:
+    """The structure of a scene's step."""
+    ranges = [each for effect in effects for each in effect.joint_ranges(tree)]
+    limited = any(math.isfinite(each.lower) or math.isfinite(each.upper) for each in ranges)
+    touching = limited or any(effect.touching_pairs(tree) for effect in effects)
+    free = not touching and all(link.joint.kind is JointKind.FREE for link in tree.links)
+    return Structure(any(effect.point_pairs(tree) for effect in effects), touching, free)
 
 
 def step_source(
-    effects: Sequence[Effect],
-    constrained: bool,
-    integrator: IntegratorName,
-    touching: bool = False,
-    sleeping: bool = False,
+    effects: Sequence[Effect], structure: Structure, integrator: IntegratorName, sleeping: bool = False
 ) -> str:
-    """The text of a scene's step module, with equality rows or not, with inequality rows or not, and with sleep or not."""
+    """The text of a scene's step module, with sleep or not."""
     files = [f"integrators.{file}" for file in INTEGRATORS[integrator].files]
-    events = [*(["contact.events"] if touching else []), *(["contact.sleep"] if sleeping else [])]
+    events = [*(["contact.events"] if structure.touching else []), *(["contact.sleep"] if sleeping else [])]
     texts = {name: _text(name) for name in ("motion", *files, *events, "step")}
     compiled = [effect.compiled for effect in effects if effect.compiled is not None]
     timed = [effect.comes_and_goes for effect in effects if effect.compiled is not None]
@@ -118,26 +133,25 @@ def step_source(
         bodies = ["\n    ".join(own) for own in lines.values()]
         parts = ["\n".join(imports), *(head + body for head, body in zip(heads, bodies, strict=True))]
         texts["motion"] = _replace(texts["motion"], "effects", "\n\n\n".join(parts) + "\n")
-    texts["motion"] = _replace(texts["motion"], "constraints", f"CONSTRAINED = {constrained}")
-    if touching:
+    texts["motion"] = _replace(texts["motion"], "constraints", f"CONSTRAINED = {structure.constrained}")
+    if structure.free:
+        line = "from physics_prior.dynamics.memory import free_sections as sections"
+        texts["motion"] = _replace(texts["motion"], "links", line)
+    if structure.touching:
         step = "sleeping_step" if sleeping else "event_step"
         texts["step"] = _replace(texts["step"], "events", f"move, linearise = {step}, linearise_events")
     return "\n\n".join(texts.values())
 
 
 def step_module(
-    effects: Sequence[Effect],
-    constrained: bool,
-    integrator: IntegratorName,
-    touching: bool = False,
-    sleeping: bool = False,
+    effects: Sequence[Effect], structure: Structure, integrator: IntegratorName, sleeping: bool = False
 ) -> ModuleType:
     """The step module of a scene, written to the kernel cache where it is not there yet, and imported.
 
     Raises:
         ModelError: a kernel of a user's effect does not compile.
     """
-    text = step_source(effects, constrained, integrator, touching, sleeping)
+    text = step_source(effects, structure, integrator, sleeping)
     name = "step_" + hashlib.sha256(text.encode()).hexdigest()[:16]
     if name in sys.modules:
         return sys.modules[name]

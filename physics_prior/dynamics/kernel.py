@@ -6,10 +6,11 @@ from functools import cache
 from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
 from numba.core import event
 
 from physics_prior.dynamics.kernel_cache import cache_directory, within
-from physics_prior.dynamics.kernel_compiler import Kernel
+from physics_prior.dynamics.kernel_compiler import CONSTANT_FIELDS, Kernel
 
 FASTMATH = {"nsz"}
 """No flag that lets rounding depend on where a kernel was inlined: the same recording gives the same bits. NaN stays visible."""
@@ -48,6 +49,11 @@ def kernel(function: Function) -> Function:
 def inline_kernel(function: Function) -> Function:
     """Compile a small helper (3-vector algebra) that the optimiser is told to inline."""
     return _compile(function, inline=True)
+
+
+def constant_fields(dtype: np.dtype, values: dict[str, int]) -> None:
+    """Have kernels take fields that records of a type lack as constants: what these rule out is not compiled."""
+    CONSTANT_FIELDS[numba.from_dtype(dtype)] = values
 
 
 @cache

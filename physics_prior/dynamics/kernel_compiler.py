@@ -16,14 +16,17 @@ from numba.core import ir, typed_passes, untyped_passes
 from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, CompileResult, compile_result
-from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.compiler_machinery import FunctionPass, PassManager, register_pass
 from numba.core.environment import lookup_environment
 from numba.core.errors import LoweringError
+from numba.core.ir_utils import get_definition, guard
 from numba.core.registry import CPUDispatcher
 
 from physics_prior.dynamics.kernel_cache import KernelCache, is_own
 
 ALLOCATES = "NRT_MemInfo_alloc"
+CONSTANT_FIELDS: dict[types.Record, dict[str, int]] = {}
+"""By type of a record: fields that it lacks, and what kernels take in their place."""
 
 
 class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc]
@@ -72,6 +75,44 @@ class _Remembering:
         if key not in self._known:
             self._known[key] = self._context.resolve_function_type(function, args, kws)
         return self._known[key]
+
+
+@register_pass(mutates_CFG=False, analysis_only=False)
+class _ConstantFields(FunctionPass):  # type: ignore[misc]
+    """Puts constants in place of fields that the records of an argument lack, before dead branches are pruned."""
+
+    _name = "constant_fields"
+
+    def __init__(self) -> None:
+        super().__init__()
+
+    def run_pass(self, state: Any) -> bool:
+        known: dict[int | None, dict[str, int]]
+        known = {index: constants for index, constants in enumerate(map(_constants, state.args)) if constants}
+        if not known:
+            return False
+        code = state.func_ir
+        for each in [each for block in code.blocks.values() for each in block.find_insts(ir.Assign)]:
+            if isinstance(each.value, ir.Expr) and each.value.op == "getattr":
+                constants = known.get(_argument(code, each.value.value), {})
+                if each.value.attr in constants:
+                    definitions = code._definitions[each.target.name]
+                    constant = ir.Const(constants[each.value.attr], each.loc)
+                    definitions[definitions.index(each.value)] = each.value = constant
+        return True
+
+
+def _constants(kind: Any) -> dict[str, int]:
+    """What fields that records of an argument lack are taken as."""
+    return CONSTANT_FIELDS.get(kind.dtype if isinstance(kind, types.Array) else kind, {})
+
+
+def _argument(code: Any, variable: ir.Var) -> int | None:
+    """Which argument a variable is, or is an element of; None where it is neither."""
+    origin = guard(get_definition, code, variable)
+    while isinstance(origin, ir.Expr) and origin.op in ("getitem", "static_getitem"):
+        origin = guard(get_definition, code, origin.value)
+    return origin.index if isinstance(origin, ir.Arg) else None
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -160,6 +201,7 @@ class _Pipeline(CompilerBase):  # type: ignore[misc]
             untyped_passes.TranslateByteCode,
             untyped_passes.FixupArgs,
             untyped_passes.IRProcessing,
+            _ConstantFields,
             untyped_passes.RewriteSemanticConstants,
             untyped_passes.DeadBranchPrune,  # what a scene has not: `if CONSTRAINED`
             untyped_passes.GenericRewrites,

@@ -15,7 +15,7 @@ from numba.np.arrayobj import np_cfarray
 from physics_prior.dynamics.constraint_derivatives import GAP
 from physics_prior.dynamics.derivatives import COMPOSITE, FREEDOM
 from physics_prior.dynamics.kernel import inline_kernel
-from physics_prior.dynamics.records import BOUNDS, LINK, PAIR, WORK, row_bounds
+from physics_prior.dynamics.records import BOUNDS, FREE_LINK, LINK, PAIR, WORK, row_bounds
 from physics_prior.dynamics.types import Array
 
 HEAD = 12
@@ -33,7 +33,7 @@ class Memory:
 
     Attributes:
         array: what compiled steps take.
-        links, work, pairs: (N,) LINK, (N,) WORK and (P,) PAIR records.
+        links, work, pairs: (N,) LINK or FREE_LINK, (N,) WORK and (P,) PAIR records.
         rows: (m + 3, 2 w + 2 m + BOUNDS) constraint rows over the w degrees of freedom that they move (constraint.py).
         known: (nq + 2,) the configuration whose factors and rows stand in the memory, their rank, and the position error, m,
             that projection may leave there.
@@ -73,16 +73,17 @@ class Memory:
         self.array[:6] = len(links), len(pairs), m, nq, nv, sizes[3]
         self.array[VECTORS], self.array[WORKSPACE], self.array[CONTACT_PART] = vectors, workspace, ends[9]
         own = [self.array[a:b] for a, b in pairwise(ends)]
-        self.links, self.work, self.pairs = own[0].view(LINK), own[1].view(WORK), own[2].view(PAIR)
+        self.links, self.work, self.pairs = own[0].view(links.dtype), own[1].view(WORK), own[2].view(PAIR)
         self.rows = own[3].reshape(m + 3, 2 * width + 2 * m + BOUNDS)
         self.known, self.parameters = own[4], own[8]
         self.spare = own[6].reshape(vectors, nv)
         self.contact_part = own[9]
         if contact_part is not None:
             own[9][:] = contact_part
-        self.links[:], self.pairs[:], self.parameters[:] = links, pairs, parameters
+        records = links.view(LINK)
+        own[0].view(LINK)[:], self.pairs[:], self.parameters[:] = records, pairs, parameters
         if m:
-            self.rows[:m, -BOUNDS:] = row_bounds(links, pairs, width)
+            self.rows[:m, -BOUNDS:] = row_bounds(records, pairs, width)
 
 
 @intrinsic
@@ -121,6 +122,13 @@ def sections(memory: Array) -> Any:
         array_at(memory, f, (int(memory[VECTORS]), nv), FLOAT),
         array_at(memory, p, int(memory[CONTACT_PART]) - p, FLOAT),
     )
+
+
+@inline_kernel
+def free_sections(memory: Array) -> Any:
+    """The same of a scene without joints, whose links are FREE_LINK."""
+    _, work, pairs, rows, known, start, spare, parameters = sections(memory)
+    return array_at(memory, HEAD, int(memory[0]), FREE_LINK), work, pairs, rows, known, start, spare, parameters
 
 
 @inline_kernel

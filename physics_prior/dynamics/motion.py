@@ -26,7 +26,8 @@ from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kinematics import flow, pose, weigh
 from physics_prior.dynamics.manifold import displace
 from physics_prior.dynamics.mass_factor import factorize_mass, solve_mass
-from physics_prior.dynamics.memory import OPEN, SPARE, TIME, correction_sections, sections, tangent_sections
+from physics_prior.dynamics.memory import OPEN, SPARE, TIME, correction_sections, tangent_sections
+from physics_prior.dynamics.memory import sections as sections  # scene: links
 from physics_prior.dynamics.projection import project
 from physics_prior.dynamics.reactions import tell_wrenches
 from physics_prior.dynamics.types import Array

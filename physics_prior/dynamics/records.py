@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from physics_prior import rotations
+from physics_prior.dynamics.kernel import constant_fields
 from physics_prior.effects.effect import PointPair
 from physics_prior.model import JointKind, Tree
 from physics_prior.model.joint import FREEDOMS
@@ -34,6 +35,20 @@ LINK = np.dtype(
     align=True,
 )
 """One moving part of the model; constant while a scene runs."""
+
+ABSENT = {"parent": -1, "kind": FREE}
+FREE_LINK = np.dtype(
+    {
+        "names": [name for name in LINK.names or () if name not in ABSENT],
+        "formats": [field[0] for name, field in (LINK.fields or {}).items() if name not in ABSENT],
+        "offsets": [field[1] for name, field in (LINK.fields or {}).items() if name not in ABSENT],
+        "itemsize": LINK.itemsize,
+    },
+    align=True,
+)
+"""A link of a scene without joints, laid out as LINK is. Kernels take the fields that it lacks as constants, and are compiled
+without what other joints need."""
+constant_fields(FREE_LINK, ABSENT)
 
 WORK = np.dtype(
     [

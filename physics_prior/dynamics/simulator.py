@@ -7,7 +7,7 @@ import numpy as np
 
 from physics_prior import rotations
 from physics_prior.dynamics import anchor_motion, constraint, kinematics, manifold, newton_euler, projection
-from physics_prior.dynamics.compose import GRAVITY, pack_parameters, step_module
+from physics_prior.dynamics.compose import GRAVITY, pack_parameters, step_module, structure_of
 from physics_prior.dynamics.constraint_errors import place, position_error
 from physics_prior.dynamics.contact import impulse
 from physics_prior.dynamics.contact.memory import Sleep, candidates_in, contact_memory, residual_in, rested_in
@@ -19,7 +19,7 @@ from physics_prior.dynamics.inertia_check import check_inertia
 from physics_prior.dynamics.integrators import DEFAULT, INTEGRATORS, TOLERATED, IntegratorName
 from physics_prior.dynamics.memory import SPARE, TIME, TOLERANCE, Memory, correction_size, tangent_size
 from physics_prior.dynamics.reactions import tell_wrenches
-from physics_prior.dynamics.records import link_records, motion_tables, moved_freedoms, pair_records
+from physics_prior.dynamics.records import FREE_LINK, LINK, link_records, motion_tables, moved_freedoms, pair_records
 from physics_prior.dynamics.switches import Switches
 from physics_prior.dynamics.unknown_forces import UnknownForces
 from physics_prior.dynamics.wrench import Wrench
@@ -41,6 +41,7 @@ class Simulator:
         nq, nv, rows: sizes of configuration, velocity and constraint rows; firsts: where each constraint effect's pairs begin.
         wrench_names: whose wrenches there are: moving joints, then effects that hold something, what touches, and feet.
         touching: contacts and limits, each with the indices of its records in ``candidates``.
+        held: whether anything, a joint or an effect, can exert a wrench: not so of free bodies that nothing holds.
         unknown: the unknown forces and the values that they have now (unknown_forces.py).
         switches: which of the effects act now, and what happens when they take hold (switches.py).
         interval: s, over which impulses of contact are told as forces: the step size.
@@ -80,6 +81,7 @@ class Simulator:
             raise ModelError("'sleep' is not valid where nothing may touch: it spares contact, and there is none")
         self.touching = candidates_by_name(tree, effects)
         self.interval, self.rank = interval, 0
+        structure = structure_of(tree, effects)
         self.nq, self.nv = tree.nq, tree.nv
         self.firsts = np.array([*(first for _, first, _ in labels), len(pairs)])
         self.rows = sum(1 if pair.length is not None else len(pair.directions) for pair in pairs)
@@ -90,7 +92,7 @@ class Simulator:
         self._tangent_size = own_size + 2 * (2 * self.nv) ** 2  # F and G of a step
         width = moved_freedoms(tree, records, candidates)
         memory = Memory(
-            link_records(tree, records, candidates),
+            link_records(tree, records, candidates).view(FREE_LINK if structure.free else LINK),
             records,
             width,
             np.concatenate([parameters, tables]),
@@ -108,10 +110,11 @@ class Simulator:
             *self.touching,
             *(foot.name for foot in self.unknown.feet),
         ]
+        self.held = not structure.free or bool(pairs) or bool(self.unknown.feet)
         self._links, self._work, self._pairs = memory.links, memory.work, memory.pairs
         self.candidates = candidates_in(memory.contact_part)
         self._gravity = memory.parameters[:GRAVITY]
-        self.step = step_module(effects, bool(pairs), integrator, len(candidates) > 0, sleep is not None)
+        self.step = step_module(effects, structure, integrator, sleep is not None)
         self._rotations, self._origins = self._work["rotation"].reshape(-1, 3, 3), self._work["origin"]
         self._frames: dict[Any, tuple[int, np.ndarray, np.ndarray]] = {}
         self._still, self._vdot = np.zeros(self.nv), np.zeros(self.nv)
@@ -309,6 +312,8 @@ class Simulator:
         self._posed[:] = q
         if vdot is None:
             self._evaluate(q, v, self._still, self._vdot)
+            if not self.held:
+                return out
             tell_wrenches(self._links, self._work, self._pairs, self.firsts, out)
             for row, indices in enumerate(self.touching.values(), start=len(self._links) + len(self.firsts) - 1):
                 push = reaction(self.tree, self._work, self.candidates[indices])

@@ -12,7 +12,8 @@ from physics_prior.dynamics.constraint import row_count
 from physics_prior.dynamics.covariance import carry_factor, triangularise
 from physics_prior.dynamics.integrators.rk4 import linearise_smooth, smooth_step
 from physics_prior.dynamics.kernel import kernel
-from physics_prior.dynamics.memory import OPEN, SPARE, sections, tangent_sections
+from physics_prior.dynamics.memory import OPEN, SPARE, tangent_sections
+from physics_prior.dynamics.motion import sections
 from physics_prior.dynamics.projection import APART
 from physics_prior.dynamics.types import Array
 

@@ -21,6 +21,8 @@ def wrench_deviations(
     Raises:
         SimulationError: not finite, as of ``Simulator.acceleration``.
     """
+    if not simulator.held:
+        return np.zeros((len(simulator.wrench_names), 6))
     unknown, nv = simulator.unknown, simulator.nv
     count = len(simulator.wrench_names) - len(unknown.feet)
     total, pair = np.zeros((count + len(unknown.feet), 6)), np.empty((2, count, 6))

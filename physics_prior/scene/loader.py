@@ -6,7 +6,7 @@ from typing import Any, get_args
 import numpy as np
 from pydantic import BaseModel
 
-from physics_prior.dynamics.compose import kinds_of_rows
+from physics_prior.dynamics.compose import structure_of
 from physics_prior.effects import REGISTRY, Effect
 from physics_prior.effects.plug_ins import effect_loaders
 from physics_prior.effects.unknown_force import check_together
@@ -43,7 +43,7 @@ def build_scene(top: Place) -> Scene:
     file = validate(SceneFile, top)
     tree = build_tree(top["model"])
     effects = _read_effects(top.get("effects"), tree)
-    touching = kinds_of_rows(tree, effects)[1]
+    touching = structure_of(tree, effects).touching
     if file.step.sleep is not None and not touching:
         raise top["step"]["sleep"].error("is not valid where nothing may touch: name a contact or a joint_limit")
     if file.accuracy is not None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from physics_prior.dynamics.compose import kinds_of_rows, step_source
+from physics_prior.dynamics.compose import Structure, step_source, structure_of
 from physics_prior.dynamics.integrators import DEFAULT
 from physics_prior.dynamics.kernel_cache import cache_directory
 from physics_prior.dynamics.records import link_records, pair_records
@@ -26,7 +26,7 @@ def path_of(scene: Scene) -> Path:
     parts = [
         *(source.read_bytes() for source in sorted(Path(__file__).parent.glob("*.py"))),  # how it is chosen
         link_records(tree, pairs).tobytes(),
-        step_source(effects, kinds_of_rows(tree, effects)[0], DEFAULT).encode(),
+        step_source(effects, Structure(structure_of(tree, effects).constrained), DEFAULT).encode(),
         *(repr(each).encode() for each in (effects, scene.measurements, scene.gate, scene.simulation, scene.accuracy)),
         *(repr((each.link, each.position.tolist(), each.orientation.tolist())).encode() for each in frames),
         *(array.tobytes() for array in (scene.initial.q, scene.initial.v, scene.noise.force, scene.noise.velocity)),

@@ -12,7 +12,7 @@ from typing import Any
 
 from numba.core import event
 
-from physics_prior.dynamics.compose import kinds_of_rows, step_source
+from physics_prior.dynamics.compose import step_source, structure_of
 from physics_prior.scene import Scene, load_scene
 
 STEPS = 1000
@@ -52,10 +52,10 @@ def answer(scene: Scene) -> dict[str, Any]:
         simulator.advance(q, v, scene.step.size, STEPS)
     (assembly,) = simulator.step.advance.inspect_asm().values()
     code = instructions(assembly)
-    constrained, touching = kinds_of_rows(scene.tree, scene.effects)
+    text = step_source(scene.effects, structure_of(scene.tree, scene.effects), scene.step.integrator)
     return {
         "bits": digest(q.tobytes() + v.tobytes()),
-        "text": digest(step_source(scene.effects, constrained, scene.step.integrator, touching).encode()),
+        "text": digest(text.encode()),
         "code": digest("\n".join(code).encode()),
         "instructions": len(code),
         "modules": sorted(set(compiled.modules)),

@@ -10,7 +10,7 @@ import pytest
 from numba.core import event
 from numba.core.errors import TypingError
 
-from physics_prior.dynamics.compose import GRAVITY, pack_parameters, step_module, step_source
+from physics_prior.dynamics.compose import GRAVITY, Structure, pack_parameters, step_module, step_source
 from physics_prior.dynamics.integrators import INTEGRATORS
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kernel_cache import cache_directory
@@ -64,11 +64,11 @@ def own_effect(tmp_path):
 
 def test_step_of_no_force_is_the_template(double_pendulum):
     """Gravity and constraints are no force functions; lines of the equation of motion but the two marked stand as they are."""
-    plain = step_source([], False, "rk4")
-    assert plain == step_source([Gravity()], False, "rk4")
+    plain = step_source([], Structure(), "rk4")
+    assert plain == step_source([Gravity()], Structure(), "rk4")
     assert "none import differentiate_forces, forces" in plain
     assert "CONSTRAINED = False" in plain
-    held = step_source([Gravity(), Attachment(part="lower")], True, "rk4")
+    held = step_source([Gravity(), Attachment(part="lower")], Structure(constrained=True), "rk4")
     changed = [(a, b) for a, b in zip(plain.splitlines(), held.splitlines(), strict=True) if a != b]
     assert changed == [("CONSTRAINED = False", "CONSTRAINED = True")]
 
@@ -76,7 +76,7 @@ def test_step_of_no_force_is_the_template(double_pendulum):
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_step_is_motion_integrator_and_step_in_one_module(integrator):
     """Each names what it takes from those before it, and imports it from nowhere else."""
-    text = step_source([], False, integrator)
+    text = step_source([], Structure(), integrator)
     imports = [node.module for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ImportFrom)]
     assert not any(module.endswith(".motion") or "integrators" in module for module in imports)
     functions = [node.name for node in ast.parse(text).body if isinstance(node, ast.FunctionDef)]
@@ -86,7 +86,7 @@ def test_step_is_motion_integrator_and_step_in_one_module(integrator):
 
 
 def test_step_names_its_effects_only():
-    text = step_source([Gravity(), JointDamping(coefficients={"elbow": 1.0})], False, "rk4")
+    text = step_source([Gravity(), JointDamping(coefficients={"elbow": 1.0})], Structure(), "rk4")
     assert "apply_joint_damping(section(parameters, 0), links, work, q, v, tau)" in text
     assert "differentiate_joint_damping(section(parameters, 0), links, work, freedoms, composites, q, v," in text
     assert "effects.none" not in text
@@ -116,14 +116,14 @@ def test_step_without_an_effect_is_bit_identical_to_one_where_it_does_nothing(do
 def test_step_module_is_shared_by_scenes_of_the_same_effects(double_pendulum, heavy_top):
     modules = {Simulator(tree, [Gravity()]).step for tree in (double_pendulum, heavy_top)}
     assert len(modules) == 1
-    assert len({step_module([], False, integrator) for integrator in INTEGRATORS}) == len(INTEGRATORS)
+    assert len({step_module([], Structure(), integrator) for integrator in INTEGRATORS}) == len(INTEGRATORS)
 
 
 def test_edited_effect_is_another_step(own_effect, double_pendulum):
     first = own_effect("bench_push", 1.0)
-    before = step_source([first], False, "rk4")
+    before = step_source([first], Structure(), "rk4")
     edited = own_effect("bench_push", 2.0)
-    assert step_source([edited], False, "rk4") != before
+    assert step_source([edited], Structure(), "rk4") != before
 
 
 def test_effects_of_one_function_name_keep_apart(own_effect, double_pendulum):

@@ -134,3 +134,25 @@ def test_own_kernels_take_variable_indices_as_they_are_and_users_count_from_the_
         f"{at.replace('at(', 'there(')}print(there(np.arange(12.0).reshape(4, 3)[2:], -1, 1))\n"
     )
     assert told.splitlines() == ["(4.0, 4.0)", "(3.0, 5.0, 3.0, 5.0)", "(4.0, 4.0)"]
+
+
+def test_fields_that_a_record_lacks_are_constants_and_what_they_rule_out_is_not_compiled(use):
+    """A lean record has no 'kind': the branch of another kind, which names a field that there is not, is never looked at."""
+    told = use(
+        "from physics_prior.dynamics.kernel import constant_fields\n"
+        "LEAN = np.dtype([('x', 'f8')], align=True)\n"
+        "constant_fields(LEAN, {'kind': 4})\n"
+        "@kernel\n"
+        "def look(records):\n"
+        "    kind, result = records[0].kind, 0.0\n"
+        "    for i in range(records.shape[0]):\n"
+        "        each = records[i]\n"
+        "        if each.kind == 3 or kind == 2:\n"
+        "            result += each.missing\n"
+        "        else:\n"
+        "            result += each.x\n"
+        "    return result + kind\n"
+        "print(look(np.ones(2).view(LEAN)))\n"
+        "print(look(np.array([(3, 1.0, 7.0)], dtype=[('kind', 'i8'), ('x', 'f8'), ('missing', 'f8')])))\n"
+    )
+    assert told.split() == ["6.0", "10.0"]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import physics_prior
-from physics_prior.dynamics.compose import step_source
+from physics_prior.dynamics.compose import Structure, step_source
 from physics_prior.errors import ModelError, SceneError
 from physics_prior.estimation.process import PhysicsProcess
 from physics_prior.recording.simulate import motion
@@ -71,12 +71,12 @@ def test_example_of_the_documentation_blows_is_right_and_an_edit_is_noticed(inst
     assert np.allclose(
         simulator.acceleration(q, v)[:3], (force - (force @ line) * line) / scene.tree.mass, rtol=0.0, atol=1e-9
     )
-    before = step_source(scene.effects, True, "rk4")
+    before = step_source(scene.effects, Structure(constrained=True), "rk4")
     edited = load_scene(install(CODE.replace("c = wind_at", "c  = wind_at")))
-    after = step_source(edited.effects, True, "rk4")
+    after = step_source(edited.effects, Structure(constrained=True), "rk4")
     assert after != before
     (path.parent / "kites" / "air.py").write_text("DENSITY = 1.2")  # which its kernels may use
-    assert step_source(edited.effects, True, "rk4") not in (before, after)
+    assert step_source(edited.effects, Structure(constrained=True), "rk4") not in (before, after)
 
 
 def test_noise_of_an_effect_grows_the_covariance_as_its_force_would(install):

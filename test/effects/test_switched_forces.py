@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from physics_prior.dynamics.compose import step_source
+from physics_prior.dynamics.compose import Structure, step_source
 from physics_prior.dynamics.force_noise import PointForces
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects.drag import Drag
@@ -91,8 +91,8 @@ def test_gusts_blow_only_where_drag_acts(having):
 
 def test_only_a_force_that_may_be_switched_is_asked_whether_it_acts():
     drag = FORCES[LABELS.index("drag")]
-    assert "acts" not in step_source([drag], False, "rk4")
-    text = step_source([drag.model_copy(update={"initially": "off"}), *FORCES[1:3]], False, "rk4")
+    assert "acts" not in step_source([drag], Structure(), "rk4")
+    text = step_source([drag.model_copy(update={"initially": "off"}), *FORCES[1:3]], Structure(), "rk4")
     assert "if acts(parameters, 3, 0): apply_drag" in text
     assert text.count("if acts") == 2  # the force and its derivatives
 

@@ -12,8 +12,8 @@ from physics_prior.dynamics.integrators.implicit_midpoint import STAGES, A, B, C
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.linear_solve import factorize_square, solve_square
 from physics_prior.dynamics.manifold import differential_product, displace, displacement_derivative
-from physics_prior.dynamics.memory import SPARE, TIME, sections, stage_configuration, tangent_sections, workspace
-from physics_prior.dynamics.motion import differentiate, evaluate
+from physics_prior.dynamics.memory import SPARE, TIME, stage_configuration, tangent_sections, workspace
+from physics_prior.dynamics.motion import differentiate, evaluate, sections
 from physics_prior.dynamics.types import Array
 
 ITERATIONS = 25

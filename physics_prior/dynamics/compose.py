@@ -134,6 +134,7 @@ def step_source(
         parts = ["\n".join(imports), *(head + body for head, body in zip(heads, bodies, strict=True))]
         texts["motion"] = _replace(texts["motion"], "effects", "\n\n\n".join(parts) + "\n")
     texts["motion"] = _replace(texts["motion"], "constraints", f"CONSTRAINED = {structure.constrained}")
+    texts["motion"] = _replace(texts["motion"], "gyroscopic torques", f"MIDDLE = {INTEGRATORS[integrator].middle}")
     if structure.free:
         line = "from physics_prior.dynamics.memory import free_sections as sections"
         texts["motion"] = _replace(texts["motion"], "links", line)

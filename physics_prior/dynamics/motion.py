@@ -34,6 +34,7 @@ from physics_prior.dynamics.types import Array
 from physics_prior.effects.none import differentiate_forces, forces, potential_energy  # scene: effects
 
 CONSTRAINED = False  # scene: constraints
+MIDDLE = False  # scene: gyroscopic torques
 BESIDE, CLEAR = 3e-4, 3e-3  # rad or m that the fastest freedom moves to either side of a fold, and to be clear of it
 
 
@@ -41,7 +42,7 @@ BESIDE, CLEAR = 3e-4, 3e-3  # rad or m that the fastest freedom moves to either 
 def evaluate(memory: Array, q: Array, v: Array, extra: Array, step: float, vdot: Array) -> int:
     """Fill vdot (nv,) at q and v under the effects and extra generalized forces (nv,); return the constraints' rank.
 
-    step > 0 takes gyroscopic torques at the middle of such a step.
+    step > 0 takes gyroscopic torques at the middle of such a step where the integrator does (MIDDLE).
     """
     rank, unmet = evaluate_at(memory, q, v, extra, step, vdot)
     if CONSTRAINED and unmet > UNMET:
@@ -63,7 +64,7 @@ def evaluate_at(memory: Array, q: Array, v: Array, extra: Array, step: float, vd
         weigh(links, work)
         factorize(links, work)
     flow(links, work, v)
-    if step > 0.0:
+    if MIDDLE and step > 0.0:
         take_at_middle(links, work, step)
     copy(extra, tau)
     forces(parameters, links, work, q, v, tau)

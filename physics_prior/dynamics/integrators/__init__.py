@@ -21,6 +21,7 @@ class Integrator:
         stages: matrices (nv, 2 nv) that ``linearise_smooth`` needs beside the derivatives.
         vectors: vectors (nv,) of scratch beyond those of every step.
         implicit: whether ``smooth_step`` needs derivatives, and the same matrices, too.
+        middle: whether it takes gyroscopic torques at the middle of its steps.
         adaptive: whether it chooses its own steps, within the scene's, by a tolerance.
     """
 
@@ -29,11 +30,12 @@ class Integrator:
     stages: int
     vectors: int = 0
     implicit: bool = False
+    middle: bool = False
     adaptive: bool = False
 
 
 INTEGRATORS: dict[IntegratorName, Integrator] = {
-    "semi_implicit_euler": Integrator(("semi_implicit_euler",), order=1, stages=3),
+    "semi_implicit_euler": Integrator(("semi_implicit_euler",), order=1, stages=3, middle=True),
     "rk4": Integrator(("rk4",), order=4, stages=7),
     "implicit_midpoint": Integrator(
         ("implicit_midpoint", "implicit_runge_kutta", "parts"), order=2, stages=11, vectors=7, implicit=True

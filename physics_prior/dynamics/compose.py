@@ -27,7 +27,7 @@ from physics_prior.dynamics.derivatives import COMPOSITE, FREEDOM
 from physics_prior.dynamics.integrators import INTEGRATORS, IntegratorName
 from physics_prior.dynamics.kernel import inline_kernel
 from physics_prior.dynamics.kernel_cache import cache_directory, sources_digest
-from physics_prior.dynamics.records import LINK, WORK
+from physics_prior.dynamics.records import FREE_LINK, LINK, WORK
 from physics_prior.dynamics.types import Array
 from physics_prior.effects.effect import Effect
 from physics_prior.errors import ModelError
@@ -43,7 +43,7 @@ FUNCTIONS = {
 """By function of a CompiledForce: the function of the step that calls it, the arguments of both, and the line of a call."""
 
 NUMBERS, MATRIX = numba.types.float64[::1], numba.types.float64[:, :]
-RECORDS = {"links": LINK, "work": WORK, "freedoms": FREEDOM, "composites": COMPOSITE}
+RECORDS = {"work": WORK, "freedoms": FREEDOM, "composites": COMPOSITE}
 TYPES = {name: numba.from_dtype(dtype)[::1] for name, dtype in RECORDS.items()} | {"tau_q": MATRIX, "tau_v": MATRIX}
 
 
@@ -158,7 +158,7 @@ def step_module(
         return sys.modules[name]
     for effect in effects:
         if effect.compiled is not None and not type(effect).__module__.startswith("physics_prior."):
-            _compile_alone(effect)
+            _compile_alone(effect, FREE_LINK if structure.free else LINK)
     path = cache_directory() / f"{name}.py"
     if not path.exists():
         # written aside and moved in place, so that another process never reads half a file
@@ -175,13 +175,14 @@ def step_module(
     return module
 
 
-def _compile_alone(effect: Effect) -> None:
+def _compile_alone(effect: Effect, links: np.dtype) -> None:
     """Compile a user's kernels by themselves: inside the step, Numba's complaint would be about the step."""
+    kinds = TYPES | {"links": numba.from_dtype(links)[::1]}
     for each, (_, arguments, _) in FUNCTIONS.items():
         function = getattr(effect.compiled, each)
         if function is None:
             continue
-        signature = tuple(TYPES.get(name, NUMBERS) for name in ("parameters", *arguments.split(", ")))
+        signature = tuple(kinds.get(name, NUMBERS) for name in ("parameters", *arguments.split(", ")))
         try:
             function.compile(signature)
         except NumbaError as problem:

@@ -88,7 +88,11 @@ def carry_forced(F: Array, response: Array, h: float, forgotten: Array, U: Array
 
 
 class ForcedProcess(OnManifold):
-    """The scene's own step with unknown forces (dynamics/unknown_forces.py); n = 2 nv + nf."""
+    """The scene's own step with unknown forces (dynamics/unknown_forces.py); n = 2 nv + nf.
+
+    Attributes:
+        told: foot -> whether it stands, where that is not to be decided (landings.py).
+    """
 
     def __init__(self, scene: Scene, simulator: Simulator) -> None:
         super().__init__(scene, simulator, 2 * simulator.nv + simulator.unknown.count)
@@ -98,6 +102,7 @@ class ForcedProcess(OnManifold):
         gravity = simulator.memory.parameters[:GRAVITY]
         self._weight = simulator.tree.mass * float(np.linalg.norm(gravity))
         self.scale = max(self._weight, 1.0)
+        self.told: dict[int, bool] = {}
 
     def start(self, q: np.ndarray, v: np.ndarray) -> State:
         force = np.zeros(self.unknown.count)

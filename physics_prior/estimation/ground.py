@@ -90,6 +90,9 @@ def settle(process: "ForcedProcess", state: State, factor: np.ndarray) -> tuple[
     unsure = np.linalg.norm(factor[2 * nv :], axis=1)
     now = state.grounded.copy()
     for index, foot in enumerate(feet):
+        if index in process.told:
+            now[index] = process.told[index]
+            continue
         others = bool(np.delete(now, index).any())
         deviation = float(unsure[foot.span][2])
         now[index] = stands(process, index, state, bool(now[index]), others, factor, deviation)

@@ -8,6 +8,7 @@ from physics_prior.estimation.estimate import Estimate
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.estimation.filter import Posterior
 from physics_prior.estimation.history import Node
+from physics_prior.estimation.landings import timed
 from physics_prior.estimation.smoother import Known, smooth
 
 WHOLE = 10**18  # ns: a lag that no recording outlasts
@@ -84,7 +85,10 @@ class Lagged:
         left, self._left = self._left, []
         if left:
             self._given = _stamp(left[-1])
-            yield from (each for each in self._smoothed(left) if self._timely(each.stamp))
+            smoothed = self._smoothed(left)
+            if self.lag == WHOLE and (again := timed(self._estimator.filter, left, smoothed)) is not left:
+                smoothed = self._smoothed(again)
+            yield from (each for each in smoothed if self._timely(each.stamp))
 
     def _timely(self, stamp: int) -> bool:
         """Whether an estimate may be: without a lag, of what was the newest once, and neither late nor a start's."""

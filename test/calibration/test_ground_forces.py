@@ -18,11 +18,11 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(not BAGS.is_dir(), reason=f"m
 
 
 def test_the_total_force_of_a_walk():
-    """Percent of the mean range, and correlation: measured 2.95, .981; 4.05, .981; 5.77, .983. Of the vertical .99 is wanted."""
+    """Percent of the mean range, and correlation: measured 2.69, .985; 4.03, .981; 5.79, .983. Of the vertical .99 is wanted."""
     result = replay(BAGS / "lemouel_stand_walk", load_scene("walk_lemouel"), smooth=True, references=["/force_plate/1"])
     total = result.summary()["reference"]["forces"]["total"]
     for component, rrmse, r in (
-        ("vertical", 4.0, 0.975),
+        ("vertical", 4.0, 0.98),
         ("anterior_posterior", 8.0, 0.97),
         ("medio_lateral", 13.0, 0.90),
     ):
@@ -31,7 +31,7 @@ def test_the_total_force_of_a_walk():
 
 
 def test_the_force_under_each_foot_of_a_lower_body():
-    """Vertical, on plates 6, 5 and 3: measured 9.2, 9.5, 9.9 %. Plate 4 lacks part of the last step, as the next test shows."""
+    """Vertical, on plates 6, 5 and 3: measured 8.3, 8.4, 8.7 %. Plate 4 lacks part of the last step, as the next test shows."""
     plates = [f"/force_plate/{number}" for number in (6, 5, 3)]
     result = replay(BAGS / "bmc_walk1", load_scene("walk_bmc"), smooth=True, references=plates)
     for plate in plates:

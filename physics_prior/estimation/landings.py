@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from physics_prior.errors import SimulationError
 from physics_prior.estimation.filter import Filter, Posterior
 from physics_prior.estimation.forced_process import ForcedProcess
 from physics_prior.estimation.history import Node
@@ -42,15 +43,19 @@ def timed(filter: Filter, nodes: Sequence[Node], smoothed: Sequence[Posterior]) 
         return nodes
     first = min(min(each.met, each.decided) for each in moved)
     out: list[Node] = []
-    for node in nodes:
-        stamp = node.measurement.stamp
-        if stamp < first or node.posterior.start:
-            out.append(node)
-            continue
-        process.told = {each.foot: stamp >= each.met for each in moved if each.tells(stamp)}
-        prior = filter.predict(out[-1].posterior, stamp)
-        out.append(Node(node.measurement, prior, filter.update(prior, node.measurement)))
-    process.told = {}
+    try:
+        for node in nodes:
+            stamp = node.measurement.stamp
+            if stamp < first or node.posterior.start:
+                out.append(node)
+                continue
+            process.told = {each.foot: stamp >= each.met for each in moved if each.tells(stamp)}
+            prior = filter.predict(out[-1].posterior, stamp)
+            out.append(Node(node.measurement, prior, filter.update(prior, node.measurement)))
+    except SimulationError:  # as it was decided, it could be followed
+        return nodes
+    finally:
+        process.told = {}
     return out
 
 

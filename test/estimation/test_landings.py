@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from physics_prior.errors import SimulationError
 from physics_prior.estimation import landings
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.estimation.landings import Landing, stopped, timed
@@ -78,3 +79,12 @@ def test_a_recording_is_rolled_again_with_its_landings(walked, monkeypatch, late
     loads = [node.posterior.state.force[filter.process.unknown.feet[1].span][2] for node in again]
     assert loads[met - 1] == 0.0
     assert loads[met + 2] > 0.0
+
+
+def test_landings_that_cannot_be_followed_stay_as_decided(walked, monkeypatch):
+    filter, nodes = walked
+    stamp = nodes[-2].measurement.stamp
+    monkeypatch.setattr(landings, "landings", lambda *_: [Landing(1, stamp, stamp + 1)])
+    monkeypatch.setattr(filter, "update", lambda *_: (_ for _ in ()).throw(SimulationError("too fast")))
+    assert timed(filter, nodes, []) is nodes
+    assert not filter.process.told

@@ -22,6 +22,7 @@ ROOMS = [
         "dynamics.kernel_cache",
         "dynamics.kernel_compiler",
         "dynamics.types",
+        "dynamics.blocks",
         "dynamics.algebra",
         "dynamics.spatial",
     )

@@ -11,6 +11,7 @@ from typing import Any
 from numba import types
 from numba.extending import intrinsic
 
+from physics_prior.dynamics.blocks import BlockType, fused, spread
 from physics_prior.dynamics.kernel import inline_kernel
 from physics_prior.dynamics.types import Array, Matrix, Symmetric, Vector
 
@@ -20,10 +21,17 @@ IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 @intrinsic
 def _fma(_typing_context: Any, a: Any, b: Any, c: Any) -> Any:
-    def build(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        return builder.fma(*arguments)
+    block = next((each for each in (a, b, c) if isinstance(each, BlockType)), None)
 
-    return types.float64(types.float64, types.float64, types.float64), build
+    def build(_context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return (
+            builder.fma(*arguments)
+            if block is None
+            else fused(builder, *spread(builder, block, signature.args, arguments))
+        )
+
+    kinds = [each if isinstance(each, BlockType) else types.float64 for each in (a, b, c)]
+    return (block or types.float64)(*kinds), build
 
 
 fma: Callable[[float, float, float], float] = _fma
@@ -233,6 +241,12 @@ def difference9(a: Matrix, b: Matrix) -> Matrix:
 
 
 @inline_kernel
+def scale6(s: float, a: Symmetric) -> Symmetric:
+    """The symmetric matrix s a."""
+    return s * a[0], s * a[1], s * a[2], s * a[3], s * a[4], s * a[5]
+
+
+@inline_kernel
 def scale9(s: float, a: Matrix) -> Matrix:
     """The matrix s a."""
     return s * a[0], s * a[1], s * a[2], s * a[3], s * a[4], s * a[5], s * a[6], s * a[7], s * a[8]
@@ -299,29 +313,30 @@ def rotated_diagonal(R: Matrix, m: Symmetric) -> Symmetric:
 
 
 @inline_kernel
-def symmetric_inverse(m: Symmetric) -> Symmetric:
-    """The inverse of a symmetric 6-tuple by cofactors."""
+def symmetric_adjugate(m: Symmetric) -> tuple[Symmetric, float]:
+    """The cofactors of a symmetric 6-tuple, and one over its determinant: their product is its inverse."""
     c0 = determinant(m[3], m[5], m[4], m[4])
     c1 = determinant(m[2], m[4], m[1], m[5])
     c2 = determinant(m[1], m[4], m[2], m[3])
-    d = 1.0 / dots(m[0], m[1], m[2], c0, c1, c2)
-    return (
-        c0 * d,
-        c1 * d,
-        c2 * d,
-        determinant(m[0], m[5], m[2], m[2]) * d,
-        determinant(m[1], m[2], m[0], m[4]) * d,
-        determinant(m[0], m[3], m[1], m[1]) * d,
-    )
+    c3, c4 = determinant(m[0], m[5], m[2], m[2]), determinant(m[1], m[2], m[0], m[4])
+    c5 = determinant(m[0], m[3], m[1], m[1])
+    return (c0, c1, c2, c3, c4, c5), 1.0 / dots(m[0], m[1], m[2], c0, c1, c2)
 
 
 @inline_kernel
-def solve3(m: Matrix, u: Vector) -> Vector:
-    """The solution x of m x = u for a 3x3 matrix (9-tuple) by cofactors."""
+def symmetric_inverse(m: Symmetric) -> Symmetric:
+    """The inverse of a symmetric 6-tuple."""
+    adjugate, d = symmetric_adjugate(m)
+    return scale6(d, adjugate)
+
+
+@inline_kernel
+def inverse9(m: Matrix) -> Matrix:
+    """The inverse of a 3x3 matrix (9-tuple) by cofactors."""
     a, b, c = (m[0], m[3], m[6]), (m[1], m[4], m[7]), (m[2], m[5], m[8])
     p, q, r = cross(b, c), cross(c, a), cross(a, b)
     d = 1.0 / dot(a, p)
-    return dot(p, u) * d, dot(q, u) * d, dot(r, u) * d
+    return p[0] * d, p[1] * d, p[2] * d, q[0] * d, q[1] * d, q[2] * d, r[0] * d, r[1] * d, r[2] * d
 
 
 @inline_kernel

@@ -6,8 +6,6 @@ Vectors are taken as they are: to reshape is a call, which costs as much as to m
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.types import Array
 
-NOTHING = 1e-24  # square of a lever, m, that is rounding
-
 
 @kernel
 def clear(out: Array) -> None:
@@ -63,16 +61,9 @@ def subtract_transposed_product(a: Array, b: Array, out: Array) -> None:
 
 
 @kernel
-def drop_rounding(levers: Array, shares: Array) -> float:
-    """Clear a row's levers, m, of joints under its unit force, and shares, where they are rounding: a rod at its dead centre.
-
-    Return the sum of the squares of its levers.
-    """
-    total = 0.0
-    for k in range(levers.shape[0]):
-        total += levers[k] * levers[k]
-    if total < NOTHING:
-        for k in range(levers.shape[0]):
-            levers[k], shares[k] = 0.0, 0.0
-        total = 0.0
-    return total
+def within(numbers: Array, limit: float) -> bool:
+    """Whether all numbers (n,) are at most a limit in size; one that is not a number is not. Eight at a time, as no sum is."""
+    all_are = True
+    for k in range(numbers.shape[0]):
+        all_are = all_are and abs(numbers[k]) <= limit
+    return all_are

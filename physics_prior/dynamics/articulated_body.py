@@ -11,24 +11,22 @@ from physics_prior.dynamics.algebra import (
     add3,
     cross,
     determinant,
-    difference9,
     dot,
-    dot_on,
+    dots,
     fma,
-    full,
     get3,
     get6,
     get9,
     minus,
     minus_outer,
     plus,
-    product,
     put3,
     put6,
     put9,
-    rows_crossed,
     scale,
-    sum9,
+    scale6,
+    scale9,
+    symmetric_adjugate,
     symmetric_inverse,
     symmetric_product,
     symmetric_times,
@@ -37,7 +35,6 @@ from physics_prior.dynamics.algebra import (
 )
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import ALL, FREE, PRISMATIC, REVOLUTE
-from physics_prior.dynamics.spatial import inertia_about
 from physics_prior.dynamics.types import Array, Matrix, Record, Records, Symmetric, Vector
 
 
@@ -92,15 +89,15 @@ def shift_mass_to_parent(up: Record, arm: Vector, M: Symmetric) -> None:
 
 
 @inline_kernel
-def _schur(M: Symmetric, H: Matrix, K: Matrix) -> Symmetric:
-    """The symmetric matrix M - H^T K, K = J^-1 H: the mass felt through a ball joint."""
+def _schur(M: Symmetric, H: Matrix, C: Matrix, s: float) -> Symmetric:
+    """The symmetric matrix M - s H^T C: the mass felt through a ball joint, s C = J^-1 H; s, a division, comes last."""
     return (
-        dot_on(M[0], -H[0], -H[3], -H[6], K[0], K[3], K[6]),
-        dot_on(M[1], -H[0], -H[3], -H[6], K[1], K[4], K[7]),
-        dot_on(M[2], -H[0], -H[3], -H[6], K[2], K[5], K[8]),
-        dot_on(M[3], -H[1], -H[4], -H[7], K[1], K[4], K[7]),
-        dot_on(M[4], -H[1], -H[4], -H[7], K[2], K[5], K[8]),
-        dot_on(M[5], -H[2], -H[5], -H[8], K[2], K[5], K[8]),
+        fma(-s, dots(H[0], H[3], H[6], C[0], C[3], C[6]), M[0]),
+        fma(-s, dots(H[0], H[3], H[6], C[1], C[4], C[7]), M[1]),
+        fma(-s, dots(H[0], H[3], H[6], C[2], C[5], C[8]), M[2]),
+        fma(-s, dots(H[1], H[4], H[7], C[1], C[4], C[7]), M[3]),
+        fma(-s, dots(H[1], H[4], H[7], C[2], C[5], C[8]), M[4]),
+        fma(-s, dots(H[2], H[5], H[8], C[2], C[5], C[8]), M[5]),
     )
 
 
@@ -117,24 +114,11 @@ def _minus_symmetric(m: Symmetric, u: Vector, w: Vector) -> Symmetric:
     )
 
 
-@inline_kernel
-def rigid_inertias(links: Records, work: Records) -> None:
-    """Fill J, H and M of every link with those of the rigid link about its own joint; needs the kinematics."""
-    work[0].factored = 0
-    for i in range(links.shape[0]):
-        here = work[i]
-        m = links[i].mass
-        x, y, z = get3(here.center)
-        put6(here.J, inertia_about(get6(here.inertia), m, (x, y, z)))
-        put9(here.H, (0.0, -m * z, m * y, m * z, 0.0, -m * x, -m * y, m * x, 0.0))
-        put6(here.M, (m, 0.0, 0.0, m, 0.0, m))
-
-
 @kernel
 def factorize(links: Records, work: Records) -> None:
-    """Fill the articulated inertias of all links, inward; needs the kinematics."""
-    rigid_inertias(links, work)
-    for i in range(links.shape[0] - 1, -1, -1):
+    """Turn the rigid inertias that ``weigh`` left into the articulated ones of all links, inward."""
+    for step in range(links.shape[0] - 1, -1, -1):
+        i = links[step].visit
         link, here = links[i], work[i]
         J, H, M = get6(here.J), get9(here.H), get6(here.M)
         if link.kind == REVOLUTE or link.kind == PRISMATIC:
@@ -155,11 +139,11 @@ def factorize(links: Records, work: Records) -> None:
                 H = minus_outer(H, a, f)
                 shift_to_parent(work[link.parent], get3(here.arm), J, H, M)
         else:
-            inverse = symmetric_inverse(J)
-            put6(here.J_inverse, inverse)
-            K = symmetric_product(inverse, H)
-            put9(here.K, K)
-            M = _schur(M, H, K)
+            adjugate, inverse = symmetric_adjugate(J)
+            C = symmetric_product(adjugate, H)
+            put6(here.J_inverse, scale6(inverse, adjugate))
+            put9(here.K, scale9(inverse, C))
+            M = _schur(M, H, C, inverse)
             put6(here.M, M)
             if link.kind == FREE:
                 put6(here.M_inverse, symmetric_inverse(M))
@@ -181,15 +165,14 @@ def accelerate(links: Records, work: Records, tau: Array, gravity: Array, vdot: 
 @kernel
 def gather(links: Records, work: Records, tau: Array) -> None:
     """Run all forces inward through the factors: what is left at each joint to accelerate it."""
-    for i in range(links.shape[0]):
-        here = work[i]
-        omega, center = get3(here.omega), get3(here.center)
-        force = scale(links[i].mass, cross(omega, cross(omega, center)))
-        put3(here.bias_moment, minus(plus(get3(here.gyroscopic), cross(center, force)), get3(here.moment)))
-        put3(here.bias_force, minus(force, get3(here.force)))
-    for i in range(links.shape[0] - 1, -1, -1):
+    for step in range(links.shape[0] - 1, -1, -1):
+        i = links[step].visit
         link, here = links[i], work[i]
-        moment, force = get3(here.bias_moment), get3(here.bias_force)
+        omega, center = get3(here.omega), get3(here.center)
+        own = scale(link.mass, cross(omega, cross(omega, center)))
+        moment = plus(get3(here.bias_moment), plus(get3(here.gyroscopic), cross(center, own)))
+        moment = minus(moment, get3(here.moment))
+        force = plus(get3(here.bias_force), minus(own, get3(here.force)))
         n = link.v
         if link.kind == REVOLUTE or link.kind == PRISMATIC:
             u = tau[n] - dot(get3(here.axis), moment if link.kind == REVOLUTE else force)
@@ -259,72 +242,6 @@ def release(links: Records, work: Records, gravity: Array, end: int, vdot: Array
 
 
 @kernel
-def push(
-    links: Records, work: Records, link_index: int, point: Vector, forces: Matrix, count: int, y: Array, z: Array
-) -> None:
-    """Run forces at a world point on a link inward through the factors: add S^T w to y and D^-1 S^T w to z.
-
-    forces is a 3x3 matrix whose first ``count`` rows are forces; y and z (count, w) have the columns of the degrees of freedom
-    that constraints move. y_r . z_s of two forces is their entry of A M^-1 A^T. Entries of ball joints are in world
-    axes. The wrench left after a joint moves on to its parent; a force on the world does nothing.
-    """
-    if link_index >= 0:
-        moments = rows_crossed(minus(point, get3(work[link_index].origin)), forces)
-        push_wrenches(links, work, link_index, moments, forces, count, y, z)
-
-
-@kernel
-def push_joint(links: Records, work: Records, i: int, force: float, y: Array, z: Array) -> None:
-    """Do as ``push`` with the force or torque of a revolute or prismatic joint; y and z are (1, w)."""
-    link, here = links[i], work[i]
-    share = force * here.D
-    y[0, link.column] += force
-    z[0, link.column] += share
-    if link.parent >= 0:
-        a, b, c = scale(-share, get3(here.U_force))
-        force_left = (a, b, c, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        a, b, c = scale(-share, get3(here.U_moment))
-        moment_left = sum9((a, b, c, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), rows_crossed(get3(here.arm), force_left))
-        push_wrenches(links, work, link.parent, moment_left, force_left, 1, y, z)
-
-
-@kernel
-def push_wrenches(
-    links: Records, work: Records, link_index: int, moments: Matrix, forces: Matrix, count: int, y: Array, z: Array
-) -> None:
-    """Do as ``push`` with wrenches: the first ``count`` rows of moments about the link's origin and of forces."""
-    i = link_index
-    while i >= 0:
-        link, here = links[i], work[i]
-        k = link.column
-        if link.kind == REVOLUTE or link.kind == PRISMATIC:
-            s = times(moments if link.kind == REVOLUTE else forces, get3(here.axis))
-            share = scale(here.D, s)
-            for r in range(count):
-                y[r, k] += s[r]
-                z[r, k] += share[r]
-            moments = minus_outer(moments, share, get3(here.U_moment))
-            forces = minus_outer(forces, share, get3(here.U_force))
-            moments = sum9(moments, rows_crossed(get3(here.arm), forces))
-        else:
-            turn = product(moments, full(get6(here.J_inverse)))
-            forces = difference9(forces, product(moments, get9(here.K)))
-            if link.kind == FREE:
-                shift = product(forces, full(get6(here.M_inverse)))
-                for r in range(count):
-                    for c in range(3):
-                        y[r, k + c] += forces[3 * r + c]
-                        z[r, k + c] += shift[3 * r + c]
-                k += 3
-            for r in range(count):
-                for c in range(3):
-                    y[r, k + c] += moments[3 * r + c]
-                    z[r, k + c] += turn[3 * r + c]
-            moments = rows_crossed(get3(here.arm), forces)
-        i = link.parent
-
-
-@kernel
 def load_joints(links: Records, work: Records, end: int, forces: Array) -> None:
     """Add generalized forces (w,), run through the factors as ``push`` does, to what ``gather`` left at the joints."""
     for i in range(links.shape[0]):
@@ -342,14 +259,14 @@ def load_joints(links: Records, work: Records, end: int, forces: Array) -> None:
 
 
 @kernel
-def pull(links: Records, work: Records, z: Array, end: int, vdot: Array) -> None:
+def pull(links: Records, work: Records, z: Array, begin: int, end: int, vdot: Array) -> None:
     """Run z (nv,) outward through the factors: fill vdot (nv,) = M^-1 tau, and the links' increments of acceleration.
 
-    Those of the links whose column is before end.
+    Those of the links whose column is in [begin, end); the increments of what they hang on must be there.
     """
     for i in range(links.shape[0]):
         link, here = links[i], work[i]
-        if link.column >= end:
+        if link.column < begin or link.column >= end:
             continue
         alpha, acceleration = ZERO, ZERO
         if link.parent >= 0:

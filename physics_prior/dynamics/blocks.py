@@ -3,12 +3,14 @@
 A block is a value, as a float is. Its sums have an order that is written here: bits do not depend on where it is inlined.
 """
 
+import operator
 from typing import Any
 
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, models, register_model
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, models, register_model
 
 DOUBLE, LANE = ir.DoubleType(), ir.IntType(32)
 REGISTER = 4  # numbers that a sum of products takes at once
@@ -26,6 +28,109 @@ class BlockType(types.Type):  # type: ignore[misc]
 class _BlockModel(models.PrimitiveModel):  # type: ignore[misc]
     def __init__(self, manager: Any, block: BlockType) -> None:
         super().__init__(manager, block, ir.VectorType(DOUBLE, block.count))
+
+
+def _define(operation: Any, instruction: str, *kinds: tuple[Any, ...]) -> None:
+    """Let blocks, or a block and a number, be added and so on: what algebra.py says of numbers holds of blocks too."""
+
+    def generic(_self: Any, args: tuple[Any, ...], _kws: Any) -> Any:
+        block = next((each for each in args if isinstance(each, BlockType)), None)
+        return signature(block, *args) if block and set(args) <= {block, types.float64} else None
+
+    def lower(_context: Any, builder: Any, found: Any, args: Any) -> Any:
+        return getattr(builder, instruction)(*spread(builder, found.return_type, found.args, args))
+
+    infer_global(operation)(type(f"Block_{instruction}", (AbstractTemplate,), {"generic": generic}))
+    for each in kinds:
+        lower_builtin(operation, *each)(lower)
+
+
+_PAIRS = (BlockType, BlockType), (types.Float, BlockType), (BlockType, types.Float)
+_define(operator.add, "fadd", *_PAIRS)
+_define(operator.sub, "fsub", *_PAIRS)
+_define(operator.mul, "fmul", *_PAIRS)
+_define(operator.truediv, "fdiv", *_PAIRS)
+_define(operator.neg, "fneg", (BlockType,))
+
+
+@intrinsic(prefer_literal=True)
+def get_lanes(_typing_context: Any, records: Any, field: Any, index: Any, where: Any) -> Any:
+    """A block of a record's number, the index-th of a field, of the records (a tuple of indices) that are where."""
+    block = BlockType(where.count)
+
+    def build(context: Any, builder: Any, kinds: Any, arguments: Any) -> Any:
+        vector = context.get_value_type(block)(ir.Undefined)
+        for lane, place in enumerate(_places(context, builder, kinds.args, arguments)):
+            vector = builder.insert_element(vector, builder.load(place), LANE(lane))
+        return vector
+
+    return block(records, field, index, where), build
+
+
+@intrinsic(prefer_literal=True)
+def put_lanes(_typing_context: Any, records: Any, field: Any, index: Any, where: Any, block: Any) -> Any:
+    """Store a block as ``get_lanes`` reads it. Of records that are there more than once the last holds."""
+
+    def build(context: Any, builder: Any, kinds: Any, arguments: Any) -> Any:
+        for lane, place in enumerate(_places(context, builder, kinds.args, arguments)):
+            builder.store(builder.extract_element(arguments[4], LANE(lane)), place)
+        return context.get_dummy_value()
+
+    return types.void(records, field, index, where, block), build
+
+
+def _places(context: Any, builder: Any, kinds: Any, arguments: Any) -> list[Any]:
+    """Where the number stands in each of the records."""
+    record = kinds[0].dtype
+    offset = record.offset(kinds[1].literal_value) + 8 * kinds[2].literal_value
+    data = builder.bitcast(
+        context.make_array(kinds[0])(context, builder, arguments[0]).data, ir.IntType(8).as_pointer()
+    )
+    out = []
+    for each in cgutils.unpack_tuple(builder, arguments[3]):
+        byte = builder.add(builder.mul(each, each.type(record.size)), each.type(offset))
+        out.append(builder.bitcast(builder.gep(data, [byte]), DOUBLE.as_pointer()))
+    return out
+
+
+@intrinsic
+def lanes_of(_typing_context: Any, a: Any, b: Any, c: Any) -> Any:
+    """A block of four numbers, the last zero."""
+    block = BlockType(4)
+
+    def build(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        vector = context.get_value_type(block)(None)
+        for lane, each in enumerate(arguments):
+            vector = builder.insert_element(vector, each, LANE(lane))
+        return vector
+
+    return block(types.float64, types.float64, types.float64), build
+
+
+@intrinsic(prefer_literal=True)
+def lane(_typing_context: Any, block: Any, index: Any) -> Any:
+    """A number of a block, the index a constant."""
+
+    def build(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        return builder.extract_element(arguments[0], LANE(index.literal_value))
+
+    return types.float64(block, index), build
+
+
+@intrinsic
+def at_most(_typing_context: Any, a: Any, b: Any) -> Any:
+    """Whether all numbers of a block are at most those of another, or a number; or a number is at most another."""
+    block = next((each for each in (a, b) if isinstance(each, BlockType)), None)
+
+    def build(_context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        if block is None:
+            return builder.fcmp_ordered("<=", *arguments)
+        holds = builder.fcmp_ordered("<=", *spread(builder, block, signature.args, arguments))
+        bits = builder.bitcast(holds, ir.IntType(block.count))
+        return builder.icmp_unsigned("==", bits, bits.type((1 << block.count) - 1))
+
+    kinds = [each if isinstance(each, BlockType) else types.float64 for each in (a, b)]
+    return types.boolean(*kinds), build
 
 
 @intrinsic(prefer_literal=True)
@@ -58,27 +163,6 @@ def put_block(_typing_context: Any, array: Any, begin: Any, block: Any, some: An
 
 
 @intrinsic
-def scale_block(_typing_context: Any, s: Any, block: Any) -> Any:
-    """The product s b of a number and a block."""
-
-    def build(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        return builder.fmul(_spread(builder, arguments[0], block.count), arguments[1])
-
-    return block(types.float64, block), build
-
-
-@intrinsic
-def minus_scaled(_typing_context: Any, b: Any, s: Any, a: Any) -> Any:
-    """The block b - s a, rounded once."""
-
-    def build(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        share = builder.fneg(_spread(builder, arguments[1], b.count))
-        return _fma(builder, share, arguments[2], arguments[0])
-
-    return b(b, types.float64, b), build
-
-
-@intrinsic
 def inner(_typing_context: Any, a: Any, b: Any) -> Any:
     """The inner product of two blocks, of which the shorter ends in a register's end."""
     count = min(a.count, b.count)
@@ -90,7 +174,7 @@ def inner(_typing_context: Any, a: Any, b: Any) -> Any:
         total = None
         for begin in range(0, count, REGISTER):
             x, y = (part(block, list(range(begin, begin + REGISTER))) for block in arguments)
-            total = builder.fmul(x, y) if total is None else _fma(builder, x, y, total)
+            total = builder.fmul(x, y) if total is None else fused(builder, x, y, total)
         halves = builder.fadd(part(total, [0, 1]), part(total, [2, 3]))
         return builder.fadd(builder.extract_element(halves, LANE(0)), builder.extract_element(halves, LANE(1)))
 
@@ -107,11 +191,19 @@ def _lanes(
     return place, builder.icmp_signed("<", order, _spread(builder, some, block.count))
 
 
-def _fma(builder: Any, a: Any, b: Any, c: Any) -> Any:
+def fused(builder: Any, a: Any, b: Any, c: Any) -> Any:
     """The vector a b + c, rounded once."""
     kind = ir.FunctionType(c.type, [c.type] * 3)
     function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.fma.v{c.type.count}f64")
     return builder.call(function, [a, b, c])
+
+
+def spread(builder: Any, block: BlockType, kinds: Any, arguments: Any) -> list[Any]:
+    """The arguments of an operation on blocks, numbers as blocks of themselves."""
+    return [
+        each if isinstance(kind, BlockType) else _spread(builder, each, block.count)
+        for kind, each in zip(kinds, arguments, strict=True)
+    ]
 
 
 def _spread(builder: Any, number: Any, count: int) -> Any:

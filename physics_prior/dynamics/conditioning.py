@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from physics_prior.dynamics import constraint, kinematics
+from physics_prior.dynamics import constraint, kinematics, row_system
 
 if TYPE_CHECKING:
     from physics_prior.dynamics.simulator import Simulator
@@ -35,8 +35,8 @@ def unlike(simulator: "Simulator", q: np.ndarray) -> int | None:
 def _pivots(simulator: "Simulator") -> np.ndarray:
     """(rows,) whether the factor of A M^-1 A^T tells a row from rounding, given those before it."""
     rows, m = simulator.memory.rows, simulator.rows
-    inverse, scales = np.diagonal(rows[:m, 2 * constraint.width(rows) + m :]), rows[m + 2, :m]
-    return np.asarray(inverse * constraint.DEPENDENT * constraint.REGULARISATION * scales < 1.0)
+    inverse, scales = np.diagonal(rows[:m, 2 * row_system.width(rows) + m :]), rows[m + 2, :m]
+    return np.asarray(inverse * row_system.DEPENDENT * row_system.REGULARISATION * scales < 1.0)
 
 
 def _levers(simulator: "Simulator") -> np.ndarray:

@@ -156,7 +156,7 @@ def differentiate_rows(
                     A[r, k], A_q[r, k], rows_q[r, k], rows_v[r, k] = 0.0, 0.0, 0.0, 0.0
             continue
         differentiate_gap(links, work, freedom_records, composites, pair, gaps)
-        rate, acceleration = approach(work, pair), relative_acceleration(work, pair, gravity)
+        rate, acceleration = approach(work, pair), relative_acceleration(work, pair, get3(gravity))
         between = minus(get3(pair.b), get3(pair.a))
         distance = math.sqrt(dot(between, between))
         for row in range(pair.rows):

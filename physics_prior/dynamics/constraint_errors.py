@@ -109,9 +109,33 @@ def velocity_error(work: Records, pairs: Records, out: Array) -> None:
 
 
 @inline_kernel
-def relative_acceleration(work: Records, pair: Record, gravity: Array) -> Vector:
+def point_increment(on: Record, point: Vector) -> Vector:
+    """What a world point that moves with a link is displaced by, to first order, by the link's increments, m."""
+    return plus(get3(on.delta_acceleration), cross(get3(on.delta_alpha), minus(point, get3(on.origin))))
+
+
+@kernel
+def error_beyond(work: Records, pairs: Records, errors: Array, out: Array) -> float:
+    """Fill out (m,) with what the links' increments leave of errors (m,), NEGATED ones both, m; return the largest magnitude."""
+    worst = 0.0
+    for p in range(pairs.shape[0]):
+        pair = pairs[p]
+        moved = ZERO
+        if pair.link_b >= 0:
+            moved = point_increment(work[pair.link_b], get3(pair.b))
+        if pair.link_a >= 0:
+            moved = minus(moved, point_increment(work[pair.link_a], get3(pair.hold)))
+        for row in range(pair.rows):
+            left = errors[pair.first + row] - dot(direction(pair, row), moved)
+            out[pair.first + row] = left
+            worst = max(worst, abs(left))
+    return worst
+
+
+@inline_kernel
+def relative_acceleration(work: Records, pair: Record, gravity: Vector) -> Vector:
     """Acceleration of point b as link a sees it, but for the turning of a rod, m/s^2."""
-    between = (-gravity[0], -gravity[1], -gravity[2])
+    between = scale(-1.0, gravity)
     if pair.link_b >= 0:
         between = point_acceleration(work[pair.link_b], get3(pair.b))
     if pair.link_a >= 0:
@@ -120,14 +144,14 @@ def relative_acceleration(work: Records, pair: Record, gravity: Array) -> Vector
         if not pair.is_rod:
             between = minus(between, scale(2.0, cross(get3(on.omega), approach(work, pair))))
     else:
-        between = plus(between, (gravity[0], gravity[1], gravity[2]))
+        between = plus(between, gravity)
         if pair.motion > 0:
             between = minus(between, get3(pair.drift_rate))
     return between
 
 
 @kernel
-def acceleration_error(work: Records, pairs: Records, gravity: Array, out: Array) -> None:
+def acceleration_error(work: Records, pairs: Records, gravity: Vector, out: Array) -> None:
     """Fill out (m,) with the rows' accelerations under the links' present ones, m/s^2 (A vdot + Adot v), NEGATED."""
     for p in range(pairs.shape[0]):
         pair = pairs[p]

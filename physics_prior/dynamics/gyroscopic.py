@@ -5,24 +5,27 @@ the implicit midpoint rule, I (w+ - w) + h wm x I wm = 0 with wm = (w + w+)/2, k
 solution is what the semi-implicit step applies to links on ball and free joints, about the point that they turn about.
 """
 
+from typing import Any
+
 from physics_prior.dynamics.algebra import (
     cross,
     dot,
     full,
     get3,
     get6,
+    inverse9,
     minus,
     plus,
-    put3,
     scale,
     scale9,
-    solve3,
     sum9,
     symmetric_times,
     times,
 )
+from physics_prior.dynamics.blocks import at_most, get_lanes, put_lanes
 from physics_prior.dynamics.kernel import inline_kernel, kernel
-from physics_prior.dynamics.records import FREE, SPHERICAL
+from physics_prior.dynamics.records import SPHERICAL
+from physics_prior.dynamics.spatial import inertia_about
 from physics_prior.dynamics.types import Matrix, Record, Records, Symmetric, Vector
 
 NEWTON_ITERATIONS = 20
@@ -50,51 +53,71 @@ def spin_matrix(inertia: Symmetric, omega: Vector) -> Matrix:
 
 @inline_kernel
 def middle_rate(inertia: Symmetric, omega: Vector, step: float) -> Vector:
-    """The angular velocity in the middle of a free body's step, by Newton's method with its first slope."""
-    after, before = omega, dot(omega, omega)
+    """The angular velocity in the middle of a free body's step, by Newton's method with its first slope.
+
+    For its difference y from omega: (I + h/2 K) y = -h/2 (omega x I omega + y x I y), K the spin matrix at omega.
+    """
+    torque = cross(omega, symmetric_times(inertia, omega))
     slope = sum9(full(inertia), scale9(0.5 * step, spin_matrix(inertia, omega)))
+    back = scale9(-0.5 * step, inverse9(slope))
+    y = times(back, torque)
+    before, least = dot(y, y), NEWTON_TOLERANCE * dot(omega, omega)
     for _ in range(NEWTON_ITERATIONS):
-        middle = scale(0.5, plus(omega, after))
-        error = plus(
-            symmetric_times(inertia, minus(after, omega)),
-            scale(step, cross(middle, symmetric_times(inertia, middle))),
-        )
-        change = solve3(slope, error)
-        after = minus(after, change)
-        size = dot(change, change)
-        if size * size <= NEWTON_TOLERANCE * before * dot(after, after):
+        better = times(back, plus(torque, cross(y, symmetric_times(inertia, y))))
+        change = minus(better, y)
+        y, size = better, dot(change, change)
+        if at_most(size * size, least * before):
             break
         before = size
-    return scale(0.5, plus(omega, after))
+    return plus(omega, y)
 
 
 @inline_kernel
 def turning_inertia(link: Record, here: Record) -> Symmetric:
     """The inertia that a link turns with: about its joint where a ball joint holds that, about its centre where it is free."""
-    xx, xy, xz, yy, yz, zz = get6(here.inertia)
-    m = link.mass if link.kind == SPHERICAL else 0.0
-    x, y, z = get3(here.center)
-    return (
-        xx + m * (y * y + z * z),
-        xy - m * x * y,
-        xz - m * x * z,
-        yy + m * (x * x + z * z),
-        yz - m * y * z,
-        zz + m * (x * x + y * y),
-    )
+    mass = link.mass if link.kind == SPHERICAL else 0.0
+    return inertia_about(get6(here.inertia), mass, get3(here.center))
 
 
 @kernel
 def take_at_middle(links: Records, work: Records, step: float) -> None:
-    """Replace the gyroscopic torque of links on ball and free joints by that of the middle of the step."""
-    for i in range(links.shape[0]):
-        if (links[i].kind == SPHERICAL or links[i].kind == FREE) and links[i].mass > 0.0:
-            here = work[i]
-            inertia, omega = turning_inertia(links[i], here), get3(here.omega)
-            middle = middle_rate(inertia, omega, step)
-            start_torque = cross(omega, symmetric_times(inertia, omega))
-            change = minus(cross(middle, symmetric_times(inertia, middle)), start_torque)
-            put3(here.gyroscopic, plus(get3(here.gyroscopic), change))
+    """Replace the gyroscopic torque of links on ball and free joints by that of the middle of the step; four links at once."""
+    last = links.shape[0] - 1
+    for begin in range(0, last + 1, 4):
+        first, end = links[begin].turning, links[min(begin + 3, last)].turning
+        if first < 0 or (begin > 0 and first == links[begin - 1].turning):
+            break
+        where = (first, links[min(begin + 1, last)].turning, links[min(begin + 2, last)].turning, end)
+        inertia = inertia_about(
+            lanes6(work, "inertia", where), get_lanes(links, "turning_mass", 0, where), lanes3(work, "center", where)
+        )
+        omega = lanes3(work, "omega", where)
+        middle = middle_rate(inertia, omega, step)
+        start_torque = cross(omega, symmetric_times(inertia, omega))
+        change = minus(cross(middle, symmetric_times(inertia, middle)), start_torque)
+        x, y, z = plus(lanes3(work, "gyroscopic", where), change)
+        put_lanes(work, "gyroscopic", 0, where, x)
+        put_lanes(work, "gyroscopic", 1, where, y)
+        put_lanes(work, "gyroscopic", 2, where, z)
+
+
+@inline_kernel
+def lanes3(work: Records, field: str, where: Any) -> Any:
+    """The vectors in a field of the links that are where, as blocks."""
+    return get_lanes(work, field, 0, where), get_lanes(work, field, 1, where), get_lanes(work, field, 2, where)
+
+
+@inline_kernel
+def lanes6(work: Records, field: str, where: Any) -> Any:
+    """The symmetric matrices in a field of the links that are where, as blocks."""
+    return (
+        get_lanes(work, field, 0, where),
+        get_lanes(work, field, 1, where),
+        get_lanes(work, field, 2, where),
+        get_lanes(work, field, 3, where),
+        get_lanes(work, field, 4, where),
+        get_lanes(work, field, 5, where),
+    )
 
 
 @inline_kernel
@@ -113,6 +136,6 @@ def middle_correction(inertia: Symmetric, omega: Vector, step: float, direction:
             times(K, direction),
         ),
     )
-    change = minus(solve3(slope, right), direction)
+    change = minus(times(inverse9(slope), right), direction)
     torque = scale(-1.0 / step, symmetric_times(inertia, change))
     return minus(torque, times(spin_matrix(inertia, omega), direction))

@@ -290,7 +290,9 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         return _Inner(self.py_func, targetoptions=options, pipeline_class=_InnerPipeline)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """What the type inference of a kernel that calls this one asks."""
+        """What the type inference of a kernel that calls this one asks. Only what is inlined is compiled for constants."""
+        if not self.targetoptions["forceinline"]:
+            args = tuple(map(types.unliteral, args))
         return self._inner.get_call_template(args, kws)
 
     def get_overload(self, signature: Any) -> Any:

@@ -25,6 +25,7 @@ from physics_prior.dynamics.algebra import (
 from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import ALL, FREE, PRISMATIC, REVOLUTE, SPHERICAL
+from physics_prior.dynamics.spatial import inertia_about
 from physics_prior.dynamics.trigonometry import sine_and_cosine
 from physics_prior.dynamics.types import Array, Matrix, Record, Records, Spatial, Vector
 
@@ -51,7 +52,8 @@ def pose(links: Records, work: Records, q: Array) -> None:
 def pose_part(links: Records, work: Records, q: Array, begin: int, end: int) -> None:
     """Fill where the links are whose column is in [begin, end): those that constraints move come first, then the others."""
     work[0].factored = 0
-    for i in range(links.shape[0]):
+    for step in range(links.shape[0]):
+        i = links[step].visit
         link, here = links[i], work[i]
         if link.column < begin or link.column >= end:
             continue
@@ -85,13 +87,19 @@ def pose_part(links: Records, work: Records, q: Array, begin: int, end: int) -> 
 
 @kernel
 def weigh(links: Records, work: Records) -> None:
-    """Fill centres of mass and inertias of the links in world axes; needs ``pose``."""
+    """Fill centres of mass and inertias of the links in world axes, those about their joints too; needs ``pose``."""
+    work[0].factored = 0
     for i in range(links.shape[0]):
         link, here = links[i], work[i]
         R = get9(here.rotation)
-        put3(here.center, times(R, get3(link.center)))
-        m = get6(link.inertia)
-        put6(here.inertia, rotated_diagonal(R, m) if link.principal else rotated_inertia(R, m))
+        mass, center, inertia = link.mass, times(R, get3(link.center)), get6(link.inertia)
+        inertia = rotated_diagonal(R, inertia) if link.principal else rotated_inertia(R, inertia)
+        put3(here.center, center)
+        put6(here.inertia, inertia)
+        x, y, z = scale(mass, center)
+        put6(here.J, inertia_about(inertia, mass, center))
+        put9(here.H, (0.0, -z, y, z, 0.0, -x, -y, x, 0.0))
+        put6(here.M, (mass, 0.0, 0.0, mass, 0.0, mass))
 
 
 @inline_kernel
@@ -139,6 +147,32 @@ def flow_part(links: Records, work: Records, v: Array, end: int) -> None:
         put3(here.gyroscopic, cross(omega, symmetric_times(get6(here.inertia), omega)))
         put3(here.moment, ZERO)
         put3(here.force, ZERO)
+        put3(here.bias_moment, ZERO)
+        put3(here.bias_force, ZERO)
+
+
+@kernel
+def take_increments(links: Records, work: Records, end: int) -> None:
+    """Fill velocities of the links whose column is before end with their increments, and accelerations at that constant rate."""
+    for i in range(links.shape[0]):
+        link, here = links[i], work[i]
+        if link.column >= end:
+            continue
+        omega, velocity = get3(here.delta_alpha), get3(here.delta_acceleration)
+        alpha, acceleration = ZERO, ZERO
+        if link.parent >= 0:
+            up, arm = work[link.parent], get3(here.arm)
+            around, alpha = get3(up.omega), get3(up.alpha)
+            carried = cross(around, arm)
+            acceleration = plus(get3(up.acceleration), plus(cross(alpha, arm), cross(around, carried)))
+            if link.kind == PRISMATIC:
+                slide = minus(minus(velocity, get3(up.velocity)), carried)
+                acceleration = plus(acceleration, scale(2.0, cross(around, slide)))
+            alpha = plus(alpha, cross(around, omega))
+        put3(here.omega, omega)
+        put3(here.velocity, velocity)
+        put3(here.alpha, alpha)
+        put3(here.acceleration, acceleration)
 
 
 @inline_kernel

@@ -19,7 +19,7 @@ from physics_prior.dynamics.algebra import (
     scale,
     transposed,
 )
-from physics_prior.dynamics.blocks import get_block, minus_scaled, put_block, scale_block
+from physics_prior.dynamics.blocks import get_block, put_block
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import FREE, PRISMATIC, REVOLUTE
 from physics_prior.dynamics.spatial import add, put_spatial
@@ -104,12 +104,12 @@ def _solve_block(freedom_records: Records, L: Array, columns: Array, begin: int,
     for i in range(nv - 1, -1, -1):
         own = get_block(columns, i * width + begin, count, some)
         for k in range(i + 1, freedom_records[i].last):
-            own = minus_scaled(own, L[k, i], get_block(columns, k * width + begin, count, some))
+            own = fma(-L[k, i], get_block(columns, k * width + begin, count, some), own)
         put_block(columns, i * width + begin, own, some)
     for k in range(nv):
-        own = scale_block(freedom_records[k].inverse, get_block(columns, k * width + begin, count, some))
+        own = freedom_records[k].inverse * get_block(columns, k * width + begin, count, some)
         i = freedom_records[k].parent
         while i >= 0:
-            own = minus_scaled(own, L[k, i], get_block(columns, i * width + begin, count, some))
+            own = fma(-L[k, i], get_block(columns, i * width + begin, count, some), own)
             i = freedom_records[i].parent
         put_block(columns, k * width + begin, own, some)

@@ -10,15 +10,7 @@ import math
 from physics_prior.dynamics.anchor_motion import move_anchors
 from physics_prior.dynamics.arrays import add_product, clear, copy, subtract_transposed_product
 from physics_prior.dynamics.articulated_body import accelerate, factorize
-from physics_prior.dynamics.constraint import (
-    POSITION_TOLERANCE,
-    UNMET,
-    accelerate_constrained,
-    multiply_columns,
-    refresh,
-    responses,
-    row_count,
-)
+from physics_prior.dynamics.constraint import POSITION_TOLERANCE, UNMET, accelerate_constrained, refresh, responses
 from physics_prior.dynamics.constraint_derivatives import differentiate_rows
 from physics_prior.dynamics.derivatives import inverse_dynamics_derivatives, sweep
 from physics_prior.dynamics.gyroscopic import take_at_middle
@@ -30,6 +22,7 @@ from physics_prior.dynamics.memory import OPEN, SPARE, TIME, correction_sections
 from physics_prior.dynamics.memory import sections as sections  # scene: links
 from physics_prior.dynamics.projection import project
 from physics_prior.dynamics.reactions import tell_wrenches
+from physics_prior.dynamics.row_system import multiply_columns, row_count
 from physics_prior.dynamics.types import Array
 from physics_prior.effects.none import differentiate_forces, forces, potential_energy  # scene: effects
 

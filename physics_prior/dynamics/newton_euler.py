@@ -20,9 +20,9 @@ from physics_prior.dynamics.algebra import (
     transposed_times,
 )
 from physics_prior.dynamics.arrays import clear
-from physics_prior.dynamics.articulated_body import rigid_inertias, shift_to_parent
+from physics_prior.dynamics.articulated_body import shift_to_parent
 from physics_prior.dynamics.kernel import kernel
-from physics_prior.dynamics.kinematics import freedom, freedoms
+from physics_prior.dynamics.kinematics import freedom, freedoms, weigh
 from physics_prior.dynamics.records import FREE, PRISMATIC, REVOLUTE
 from physics_prior.dynamics.types import Array, Records
 
@@ -97,9 +97,9 @@ def inverse_dynamics(links: Records, work: Records, vdot: Array, gravity: Array,
 
 @kernel
 def mass_matrix(links: Records, work: Records, M: Array) -> None:
-    """Fill M (nv, nv) from composite inertias; needs the kinematics and overwrites the factors."""
+    """Fill M (nv, nv) from composite inertias; needs the poses and overwrites the factors."""
     clear(M)
-    rigid_inertias(links, work)
+    weigh(links, work)
     for i in range(links.shape[0] - 1, -1, -1):
         if links[i].parent >= 0:
             here = work[i]

@@ -18,6 +18,11 @@ REVOLUTE, PRISMATIC, SPHERICAL, FREE = (int(kind) for kind in JointKind if kind 
 
 LINK = np.dtype(
     [
+        ("visit", "i8"),  # of the i-th record: which link sweeps visit i-th outward, siblings one after another
+        (
+            "turning",
+            "i8",
+        ),  # ... which link that has mass is the i-th on a ball or free joint, the last again and again behind it
         ("parent", "i8"),  # index of the parent link, -1 for the world
         ("kind", "i8"),  # JointKind
         ("q", "i8"),  # first coordinate in q
@@ -29,6 +34,7 @@ LINK = np.dtype(
         ("position", "f8", 3),  # joint in the parent link's frame, m
         ("placement", "f8", 9),  # rotation matrix, link to parent link at zero
         ("mass", "f8"),  # kg
+        ("turning_mass", "f8"),  # of a ball joint's: what turns about the joint, not about its centre, kg
         ("center", "f8", 3),  # centre of mass in the link frame, m
         ("inertia", "f8", 6),  # about the centre of mass, link axes: xx xy xz yy yz zz, kg m^2
     ],
@@ -126,6 +132,16 @@ def link_records(tree: Tree, *touched: np.ndarray) -> np.ndarray:
     for i in sorted(range(len(records)), key=lambda i: i not in moved):
         records[i]["column"] = column
         column += tree.links[i].joint.nv
+    depths: list[int] = []
+    for link in tree.links:
+        depths.append(depths[link.parent] + 1 if link.parent >= 0 else 0)
+    records["visit"] = np.argsort(depths, kind="stable")
+    balls = [
+        i
+        for i, link in enumerate(tree.links)
+        if link.joint.kind in (JointKind.SPHERICAL, JointKind.FREE) and link.mass_properties.mass > 0.0
+    ]
+    records["turning"] = (balls + balls[-1:] * len(records))[: len(records)] or -1
     for record, link in zip(records, tree.links, strict=True):
         inertia = link.mass_properties.inertia
         record["parent"], record["kind"] = link.parent, int(link.joint.kind)
@@ -134,6 +150,7 @@ def link_records(tree: Tree, *touched: np.ndarray) -> np.ndarray:
         record["placement"] = rotations.matrix_from_quaternion(link.joint.orientation).ravel()
         record["turned"] = not np.array_equal(record["placement"], np.eye(3).ravel())
         record["mass"], record["center"] = link.mass_properties.mass, link.mass_properties.center_of_mass
+        record["turning_mass"] = record["mass"] if link.joint.kind is JointKind.SPHERICAL else 0.0
         record["inertia"] = inertia[np.triu_indices(3)]
         record["principal"] = np.array_equal(inertia, np.diag(np.diag(inertia)))
     return records

@@ -3,7 +3,7 @@
 A motion is (angular, linear), a force is (moment, force).
 """
 
-from physics_prior.dynamics.algebra import cross, dot, get3, plus, put3
+from physics_prior.dynamics.algebra import cross, dot, fma, get3, plus, put3
 from physics_prior.dynamics.kernel import inline_kernel
 from physics_prior.dynamics.types import Array, Spatial, Symmetric, Vector
 
@@ -31,13 +31,14 @@ def add(u: Spatial, w: Spatial) -> Spatial:
 def inertia_about(inertia: Symmetric, mass: float, center: Vector) -> Symmetric:
     """The inertia about a point from that about the centre of mass, which is at center from it (Steiner)."""
     x, y, z = center
+    p, q, r = mass * x, mass * y, mass * z
     return (
-        inertia[0] + mass * (y * y + z * z),
-        inertia[1] - mass * x * y,
-        inertia[2] - mass * x * z,
-        inertia[3] + mass * (x * x + z * z),
-        inertia[4] - mass * y * z,
-        inertia[5] + mass * (x * x + y * y),
+        fma(q, y, fma(r, z, inertia[0])),
+        fma(-p, y, inertia[1]),
+        fma(-p, z, inertia[2]),
+        fma(p, x, fma(r, z, inertia[3])),
+        fma(-q, z, inertia[4]),
+        fma(p, x, fma(q, y, inertia[5])),
     )
 
 

@@ -7,16 +7,17 @@ seventh number is the time, s. ``linearise`` is the integrator's own, or that of
 
 import math
 
-from physics_prior.dynamics.arrays import copy
-from physics_prior.dynamics.constraint import row_count
+from physics_prior.dynamics.arrays import copy, within
 from physics_prior.dynamics.covariance import carry_factor, triangularise
 from physics_prior.dynamics.integrators.rk4 import linearise_smooth, smooth_step
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.memory import OPEN, SPARE, tangent_sections
 from physics_prior.dynamics.motion import sections
 from physics_prior.dynamics.projection import APART
+from physics_prior.dynamics.row_system import row_count
 from physics_prior.dynamics.types import Array
 
+LARGEST = 1e150  # beyond it squares are not finite: an energy has to be, too
 move, linearise = smooth_step, linearise_smooth  # scene: events
 
 
@@ -34,7 +35,7 @@ def advance(memory: Array, q: Array, v: Array, extra: Array, h: float, count: in
             return rank
         if memory[OPEN] > APART:
             return -3
-    return rank if _finite(q) and _finite(v) else -1
+    return rank if within(q, LARGEST) and within(v, LARGEST) else -1
 
 
 @kernel
@@ -75,13 +76,4 @@ def carry(
     if reduced:
         for k in range(n):
             total += U[k, k]  # a reflection takes what is not finite in a row to the diagonal
-    return rank if math.isfinite(total) and _finite(q) and _finite(v) else -1
-
-
-@kernel
-def _finite(numbers: Array) -> bool:
-    """Whether numbers are finite, and their squares: an energy has to be, too."""
-    total = 0.0
-    for k in range(numbers.shape[0]):
-        total += numbers[k] * numbers[k]
-    return math.isfinite(total)
+    return rank if math.isfinite(total) and within(q, LARGEST) and within(v, LARGEST) else -1

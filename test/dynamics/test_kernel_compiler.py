@@ -156,3 +156,12 @@ def test_fields_that_a_record_lacks_are_constants_and_what_they_rule_out_is_not_
         "print(look(np.array([(3, 1.0, 7.0)], dtype=[('kind', 'i8'), ('x', 'f8'), ('missing', 'f8')])))\n"
     )
     assert told.split() == ["6.0", "10.0"]
+
+
+def test_constants_do_not_compile_a_kernel_anew(use):
+    told = use(
+        "@kernel\ndef scaled(x, k):\n    return k * x\n"
+        "@kernel\ndef several(x, k):\n    return scaled(x, 2) + scaled(x, 3) + scaled(x, k)\n"
+        "print(several(1.0, 4), len(scaled._inner.overloads))\n"
+    )
+    assert told.split() == ["9.0", "1"]

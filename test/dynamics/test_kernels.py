@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from physics_prior import inertia, rotations
+from physics_prior.dynamics.arrays import within
 from physics_prior.dynamics.formulations import generalized
 from physics_prior.dynamics.formulations.kinematics import kinematics
 from physics_prior.dynamics.simulator import Simulator
@@ -175,3 +176,12 @@ def test_posture_without_inertia_is_refused():
 def test_integrator_that_is_unknown_is_refused(double_pendulum):
     with pytest.raises(ModelError, match=r"'euler' is unknown.*rk4"):
         Simulator(double_pendulum, integrator="euler")
+
+
+@pytest.mark.parametrize("place", [0, 9, 36])
+def test_within_tells_what_is_too_large_or_no_number(place):
+    numbers = np.linspace(-1.0, 1.0, 37)
+    assert within(numbers, 1.0)
+    for wrong in (1.1, -1.1, np.inf, np.nan):
+        numbers[place] = wrong
+        assert not within(numbers, 1.0)

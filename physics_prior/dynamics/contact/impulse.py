@@ -10,7 +10,7 @@ import math
 from physics_prior.dynamics.algebra import add3, cross, get3, minus, plus, scale
 from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.articulated_body import factorize
-from physics_prior.dynamics.constraint import refresh, row_count
+from physics_prior.dynamics.constraint import refresh
 from physics_prior.dynamics.constraint_errors import direction, position_error, velocity_error
 from physics_prior.dynamics.contact.complementarity import DISC, complement
 from physics_prior.dynamics.contact.detect import TOUCHING, collect, look
@@ -25,6 +25,7 @@ from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import flow, pose, weigh
 from physics_prior.dynamics.manifold import displace
 from physics_prior.dynamics.memory import sections
+from physics_prior.dynamics.row_system import row_count
 from physics_prior.dynamics.types import Array, Records, Vector
 
 OUT = 1e-10  # m or rad: penetration that is left

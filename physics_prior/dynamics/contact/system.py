@@ -6,13 +6,14 @@ A M^-1 A^T = Y Z^T.
 
 from physics_prior.dynamics.algebra import ZERO, add3, cross, dot, get3, get9, minus, minus9, plus, scale
 from physics_prior.dynamics.arrays import clear
-from physics_prior.dynamics.articulated_body import pull, push, push_joint, push_wrenches
-from physics_prior.dynamics.constraint import row_count, width
+from physics_prior.dynamics.articulated_body import pull
 from physics_prior.dynamics.constraint_errors import point_velocity
 from physics_prior.dynamics.contact.complementarity import BILATERAL, DISC, NORMAL, PARTNER
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import ALL
+from physics_prior.dynamics.row_system import row_count, width
 from physics_prior.dynamics.types import Array, Record, Records, Vector
+from physics_prior.dynamics.unit_forces import push, push_joint, push_wrenches
 
 NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -59,8 +60,8 @@ def assemble_contacts(
             clear(Y[r])
             clear(Z[r])
         y, z = Y[m : m + number], Z[m : m + number]
-        push(links, work, candidate.link_b, point, frame, number, y, z)
-        push(links, work, candidate.link_a, point, minus9(frame), number, y, z)
+        push(links, work, candidate.link_b, point, frame, number, False, y, z)
+        push(links, work, candidate.link_a, point, minus9(frame), number, False, y, z)
         if number == 3:
             _disc(kinds, owners, bounds, m + 1, m, candidate.friction)
         if candidate.rolling > 0.0:
@@ -70,8 +71,8 @@ def assemble_contacts(
             clear(Y[r + 1])
             clear(Z[r + 1])
             turn = (frame[3], frame[4], frame[5], frame[6], frame[7], frame[8], 0.0, 0.0, 0.0)
-            push_wrenches(links, work, candidate.link_b, turn, NOTHING, 2, Y[r : r + 2], Z[r : r + 2])
-            push_wrenches(links, work, candidate.link_a, minus9(turn), NOTHING, 2, Y[r : r + 2], Z[r : r + 2])
+            push_wrenches(links, work, candidate.link_b, turn, NOTHING, 2, False, Y[r : r + 2], Z[r : r + 2])
+            push_wrenches(links, work, candidate.link_a, minus9(turn), NOTHING, 2, False, Y[r : r + 2], Z[r : r + 2])
             _disc(kinds, owners, bounds, r, m, candidate.rolling)
             number += 2
         contact.rows = number
@@ -150,7 +151,7 @@ def respond_to(links: Records, work: Records, Z: Array, impulses: Array, m: int,
         if known != 0.0:
             for k in range(Z.shape[1]):
                 z[k] += Z[r, k] * known
-    pull(links, work, z, ALL, change)
+    pull(links, work, z, 0, ALL, change)
 
 
 @kernel

@@ -11,11 +11,11 @@ import numpy as np
 from scipy.integrate import DOP853
 
 from physics_prior.dynamics.arrays import accumulate, add_product, clear, copy
-from physics_prior.dynamics.constraint import row_count
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.manifold import displace, displacement_derivative, rate, rate_derivative
 from physics_prior.dynamics.memory import SPARE, TIME, TOLERANCE, stage_configuration, tangent_sections
 from physics_prior.dynamics.motion import differentiate, evaluate, sections
+from physics_prior.dynamics.row_system import row_count
 from physics_prior.dynamics.types import Array
 
 STAGES = 12

@@ -7,13 +7,13 @@ is parallel to V; of two stages the commutator of their turns is left out, which
 import math
 
 from physics_prior.dynamics.arrays import accumulate, clear, copy
-from physics_prior.dynamics.constraint import row_count
 from physics_prior.dynamics.integrators.implicit_midpoint import STAGES, A, B, C, D
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.linear_solve import factorize_square, solve_square
 from physics_prior.dynamics.manifold import differential_product, displace, displacement_derivative
 from physics_prior.dynamics.memory import SPARE, TIME, stage_configuration, tangent_sections, workspace
 from physics_prior.dynamics.motion import differentiate, evaluate, sections
+from physics_prior.dynamics.row_system import row_count
 from physics_prior.dynamics.types import Array
 
 ITERATIONS = 25

@@ -4,11 +4,11 @@ Constraints are projected after each. Of a step that goes through at once the pa
 """
 
 from physics_prior.dynamics.arrays import add_product, clear, copy
-from physics_prior.dynamics.constraint import row_count
 from physics_prior.dynamics.integrators.implicit_runge_kutta import attempt, differentiate_part
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.memory import TIME, tangent_sections
 from physics_prior.dynamics.motion import differentiate, evaluate, sections, settle, settle_columns, spread_noise
+from physics_prior.dynamics.row_system import row_count
 from physics_prior.dynamics.types import Array
 
 SMALLEST = 1e-6  # of the step: a part shorter than that is given up

@@ -4,11 +4,11 @@ v+ = v + h vdot(q, v), then q+ = q [+] h v+.
 """
 
 from physics_prior.dynamics.arrays import accumulate, clear
-from physics_prior.dynamics.constraint import row_count
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.manifold import displace, displacement_derivative
 from physics_prior.dynamics.memory import TIME, tangent_sections
 from physics_prior.dynamics.motion import differentiate, evaluate, sections, settle, settle_columns, spread_noise
+from physics_prior.dynamics.row_system import row_count
 from physics_prior.dynamics.types import Array
 
 

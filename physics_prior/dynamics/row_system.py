@@ -149,19 +149,39 @@ def multiply_once(rows: Array) -> None:
 
 @inline_kernel
 def _solve(rows: Array, out: Array) -> None:
-    """Fill out (m,) from the right side by the regularised factor; sums whose last term is the last that is known."""
+    """Fill out (m,) from the right side by the regularised factor, three rows at a time: their sums do not wait for one another.
+
+    Beyond a row's bounds the factor is zero.
+    """
     m, w = row_count(rows), width(rows)
     left, L = rows[m], rows[:, 2 * w + m : 2 * w + 2 * m]
-    for s in range(m):
-        known = left[s]
+    s = 0
+    while s + 2 < m:
+        x, y, z = left[s], left[s + 1], left[s + 2]
         for r in range(bounds(rows, s)[2], s):
-            known = fma(-L[r, s], out[r], known)
-        out[s] = known
-    for s in range(m - 1, -1, -1):
-        known = out[s] * L[s, s]
-        for r in range(bounds(rows, s)[3] - 1, s, -1):
-            known = fma(-L[s, r], out[r], known)
-        out[s] = known
+            known = out[r]
+            x, y, z = fma(-L[r, s], known, x), fma(-L[r, s + 1], known, y), fma(-L[r, s + 2], known, z)
+        y = fma(-L[s, s + 1], x, y)
+        out[s], out[s + 1], out[s + 2] = x, y, fma(-L[s + 1, s + 2], y, fma(-L[s, s + 2], x, z))
+        s += 3
+    for t in range(s, m):
+        x = left[t]
+        for r in range(bounds(rows, t)[2], t):
+            x = fma(-L[r, t], out[r], x)
+        out[t] = x
+    for t in range(m - 1, s - 1, -1):
+        x = out[t] * L[t, t]
+        for r in range(t + 1, bounds(rows, t)[3]):
+            x = fma(-L[t, r], out[r], x)
+        out[t] = x
+    while s > 0:
+        s -= 3
+        x, y, z = out[s] * L[s, s], out[s + 1] * L[s + 1, s + 1], out[s + 2] * L[s + 2, s + 2]
+        for r in range(s + 3, bounds(rows, s + 2)[3]):
+            known = out[r]
+            x, y, z = fma(-L[s, r], known, x), fma(-L[s + 1, r], known, y), fma(-L[s + 2, r], known, z)
+        y = fma(-L[s + 1, s + 2], z, y)
+        out[s], out[s + 1], out[s + 2] = fma(-L[s, s + 1], y, fma(-L[s, s + 2], z, x)), y, z
 
 
 @kernel

@@ -225,22 +225,6 @@ def minus_outer(a: Matrix, u: Vector, w: Vector) -> Matrix:
 
 
 @inline_kernel
-def difference9(a: Matrix, b: Matrix) -> Matrix:
-    """The matrix a - b."""
-    return (
-        a[0] - b[0],
-        a[1] - b[1],
-        a[2] - b[2],
-        a[3] - b[3],
-        a[4] - b[4],
-        a[5] - b[5],
-        a[6] - b[6],
-        a[7] - b[7],
-        a[8] - b[8],
-    )
-
-
-@inline_kernel
 def scale6(s: float, a: Symmetric) -> Symmetric:
     """The symmetric matrix s a."""
     return s * a[0], s * a[1], s * a[2], s * a[3], s * a[4], s * a[5]

@@ -34,7 +34,7 @@ class Memory:
     Attributes:
         array: what compiled steps take.
         links, work, pairs: (N,) LINK or FREE_LINK, (N,) WORK and (P,) PAIR records.
-        rows: (m + 3, 2 w + 2 m + BOUNDS) constraint rows over the w degrees of freedom that they move (constraint.py).
+        rows: (m + 3, 2 w + 2 m + BOUNDS) constraint rows over the w degrees of freedom that they move (row_system.py).
         known: (nq + 2,) the configuration whose factors and rows stand in the memory, their rank, and the position error, m,
             that projection may leave there.
         parameters: the numbers of the effects.

@@ -4,7 +4,7 @@ It is a function from a posterior and a measurement to a posterior, with no memo
 will, and the same measurements give the same numbers in whatever order they came.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from physics_prior.dynamics.simulator import Simulator
 from physics_prior.dynamics.switches import Hold
 from physics_prior.errors import MeasurementError
 from physics_prior.estimation import chi_squared, switching
+from physics_prior.estimation.astray import Suspects, suspects
 from physics_prior.estimation.gain import gain_of
 from physics_prior.estimation.measurement import ForceMeasurement, Measurement, SwitchCommand, command_topic
 from physics_prior.estimation.observation import OBSERVERS, Innovation, Observer, check
@@ -42,6 +43,7 @@ class Posterior:
         start: whether it is a (re)start from measurements alone.
         begun: stamp of the scene's time zero, ns.
         holds: what holds, effect by effect of those that can.
+        astray: parts whose markers the gate refuses (astray.py).
         trouble: why the last effect that was to take hold does not; empty if it does.
     """
 
@@ -57,6 +59,7 @@ class Posterior:
     start: bool = False
     begun: int = 0
     holds: tuple[Hold, ...] = ()
+    astray: Suspects = field(default_factory=dict)
     trouble: str = ""
 
 
@@ -154,10 +157,16 @@ class Filter:
             return self._fresh(prior)
         U, seen_errors = np.ascontiguousarray(prior.factor.T), seen.H.shape[1]
         many, doubtful, partly = gated and len(seen.y) > seen.block, False, False
+        astray, passed = prior.astray, None
         if many:
             U = with_first(U, seen_errors)  # what is seen then depends on as many rows of U
             believed = seen.squares(np.ascontiguousarray(U[:seen_errors, :seen_errors])) <= self.gate_limit(seen.block)
             doubtful = float(np.mean(believed)) < QUORUM
+            if seen.links is not None and not doubtful and (astray or not believed.all()):
+                patience = round(self.scene.health.degraded_after * 1e9)
+                astray, lost = suspects(astray, prior.stamp, patience, seen.links, believed)
+                passed = seen.kept(believed) if lost.any() else None
+                believed = believed | lost
             partly = not (doubtful or believed.all())
             if partly:
                 seen = seen.kept(believed)
@@ -183,6 +192,7 @@ class Filter:
             # of what is seen: the rest, rates and forces, goes with it
             if np.max(np.abs(last.correction[: len(from_prior)] - from_prior)) < 1e-3 * SMALL_CORRECTION:
                 break
+        figures = gain if passed is None else gain_of(U, passed)  # a part found again is as surprising as a start
         state, factor = self.process.settle(state, last.factor())
         self.constrain(state, factor)
         return Posterior(
@@ -191,11 +201,12 @@ class Filter:
             factor,
             accepted=prior.stamp,
             used=True,
-            nis=gain.nis,
-            dimension=len(seen.y),
-            log_determinant=gain.log_determinant,
+            nis=figures.nis,
+            dimension=len((passed or seen).y),
+            log_determinant=figures.log_determinant,
             begun=prior.begun,
             holds=self.simulator.switches.holds,
+            astray=astray,
             trouble=prior.trouble,
         )
 

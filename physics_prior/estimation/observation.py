@@ -56,6 +56,7 @@ class Innovation:
         noise: (m, m) lower factor of the measurement's covariance.
         block: how many rows are believed or refused together; the noise of such blocks is independent.
         first: of these errors; that of q where left out.
+        links: (m / block,) on which link each block is; None where blocks are no markers.
     """
 
     y: np.ndarray
@@ -63,6 +64,7 @@ class Innovation:
     noise: np.ndarray
     block: int
     first: int = 0
+    links: np.ndarray | None = None
 
     def kept(self, blocks: np.ndarray) -> "Innovation":
         """Only some of its blocks, (m / block,) of bool."""
@@ -168,7 +170,7 @@ class PointsObserver(Observer):
             links, places, points, noise = links[seen], places[seen], points[seen], noise[np.ix_(rows, rows)]
         y, H = np.empty(3 * len(seen)), np.empty((3 * len(seen), self._scratch.shape[1]))
         see_points(self._memory.links, self._memory.work, links, places, points, y, H, self._scratch)
-        return Innovation(y, H, noise, 3)
+        return Innovation(y, H, noise, 3, links=links)
 
 
 class JointsObserver(Observer):

@@ -47,11 +47,11 @@ def noisier(scene: Scene) -> Scene:
     return replace(scene, measurements=(source.model_copy(update={"markers": tuple(markers)}),))
 
 
-def bad_day(name: str) -> tuple[int, set[Level], float, float, int]:
+def bad_day(name: str, seed: int = 6) -> tuple[int, set[Level], float, float, int]:
     """Of a scene in the degraded trial: starts, healths, error of markers in gaps (m), NIS a row, and how many rows."""
     scene = load_scene(name)
     frames = read_measurements(BAG, scene)
-    bad, lost = degraded(frames, np.random.default_rng(6))
+    bad, lost = degraded(frames, np.random.default_rng(seed))
     estimator = Estimator(noisier(scene))
     nodes: list[Node] = []
     estimator.on_settled = nodes.append
@@ -70,7 +70,7 @@ def bad_day(name: str) -> tuple[int, set[Level], float, float, int]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["walk_lemouel_tracking", "walk_lemouel"])  # measured: 6.4 mm, 0.999; 13.7 mm, 1.003
+@pytest.mark.parametrize("name", ["walk_lemouel_tracking", "walk_lemouel"])  # measured: 6.4 mm, 0.999; 13.7 mm, 1.004
 def test_a_bad_day_does_not_lose_the_walker(name):
     """Gaps are bridged, and innovations are as large as expected of the noise, gated ones left out."""
     starts, levels, error, ratio, rows = bad_day(name)
@@ -81,6 +81,16 @@ def test_a_bad_day_does_not_lose_the_walker(name):
     gate = chi2.ppf(load_scene(name).gate.probability, 3)
     expected, band = chi2.cdf(gate, 5) / chi2.cdf(gate, 3), 1.96 * np.sqrt(2.0 / rows)
     assert expected - band <= ratio <= expected + band
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["walk_lemouel_tracking", "walk_lemouel"])
+def test_a_head_that_turned_unseen_is_found_again(name):
+    """With one marker of three in a gap it turned; the others came back too far off to be believed, for good: 52 mm."""
+    starts, levels, error, *_ = bad_day(name, 1)
+    assert starts == 1
+    assert levels == {Level.OK}
+    assert error < 0.025  # measured: 10.7 and 17.6 mm
 
 
 @pytest.mark.slow

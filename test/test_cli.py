@@ -303,7 +303,7 @@ def test_replay_prints_figures_and_writes_what_it_is_asked_for(capsys, tmp_path,
     for fact in ("pendulum, causal", "101 used", "NIS", "health", "RMSE of angles", "pivot_force/z", *map(str, files)):
         assert fact in out
     assert "/joint_states" in open_bag(files[0]).topics
-    assert "<svg" in files[1].read_text()
+    assert "<svg" in files[1].read_text(encoding="utf-8")
     assert sorted(tmp_path.iterdir()) == sorted(files)  # and nothing beside
 
 

@@ -7,7 +7,7 @@ from typing import Literal
 
 from physics_prior.commands.terminal import progress, status
 from physics_prior.dynamics.compose import step_module, structure_of
-from physics_prior.dynamics.kernel_cache import cache_directory
+from physics_prior.dynamics.kernel_cache import is_kept
 from physics_prior.scene import Scene, load_scene
 from physics_prior.stepping import Choice, settle
 
@@ -30,7 +30,7 @@ def compiling(scene: Scene, last: Literal["advance", "carry"]) -> Iterator[None]
     structure = structure_of(scene.tree, scene.effects)
     sleeping = scene.step.sleep is not None and last == "advance"  # the estimator's simulator knows no sleep
     step = step_module(scene.effects, structure, scene.step.integrator, sleeping)
-    cached = any(cache_directory().glob(f"*/{step.__name__}.{getattr(step, last).__name__}-*.nbc"))
+    cached = is_kept(getattr(step, last))
     duration = WITH_CONTACT if structure.touching else DURATION
     with status(f"loading {scene.name}" if cached else f"compiling the step of {scene.name}, once: {duration}"):
         yield

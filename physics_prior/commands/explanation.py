@@ -10,6 +10,7 @@ from rich.table import Table
 
 from physics_prior.commands.compilation import compiling
 from physics_prior.commands.terminal import console, table
+from physics_prior.dynamics.beside import derivatives_beside
 from physics_prior.dynamics.compose import step_source, structure_of
 from physics_prior.dynamics.contact.geometry.manifold import SLOTS
 from physics_prior.dynamics.simulator import Simulator
@@ -56,7 +57,8 @@ def scene_figures(scene: Scene, costs: Sequence[float] | None = None, choice: Ch
     """
     with compiling(scene, "carry"):
         simulator = scene.simulator()
-        step, with_derivatives = _cost(scene, simulator)
+        with derivatives_beside(simulator.step):
+            step, with_derivatives = _cost(scene, simulator)
         follows = stable(simulator, scene.initial.q, scene.initial.v, scene.step.size)
     effects = []
     for place, effect in enumerate(scene.effects):

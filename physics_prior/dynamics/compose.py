@@ -166,11 +166,16 @@ def step_module(
         aside = path.with_suffix(f".{os.getpid()}")
         aside.write_text(text)
         aside.replace(path)
-    spec = importlib.util.spec_from_file_location(name, path)
+    return import_step(path)
+
+
+def import_step(path: Path) -> ModuleType:
+    """The step module of a file in the kernel cache."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
+    sys.modules[path.stem] = module
     spec.loader.exec_module(module)
     return module
 

@@ -63,6 +63,11 @@ def is_own(file: Path) -> bool:
     return file.is_relative_to(_PACKAGE) or file.is_relative_to(cache_directory())
 
 
+def is_kept(kernel: Any) -> bool:
+    """Whether machine code of a kernel of a step module, for Python, is on disk."""
+    return any(cache_directory().glob(f"*/{kernel.__module__}.{kernel.__name__}-*.nbc"))
+
+
 def within(folder: Path, decorate: Callable[[], Any]) -> Any:
     """What a decorator of Numba's own returns, which reads where its cache is when it decorates."""
     before = numba.config.CACHE_DIR

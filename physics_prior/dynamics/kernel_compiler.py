@@ -284,7 +284,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         self._cache = _EntryCache(function)
 
     @cached_property
-    def _inner(self) -> _Inner:
+    def inner(self) -> _Inner:
         """Made when a kernel that calls this one is compiled."""
         options = {**self.targetoptions, "no_cpython_wrapper": True}
         return _Inner(self.py_func, targetoptions=options, pipeline_class=_InnerPipeline)
@@ -293,8 +293,8 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         """What the type inference of a kernel that calls this one asks. Only what is inlined is compiled for constants."""
         if not self.targetoptions["forceinline"]:
             args = tuple(map(types.unliteral, args))
-        return self._inner.get_call_template(args, kws)
+        return self.inner.get_call_template(args, kws)
 
     def get_overload(self, signature: Any) -> Any:
         """What the lowering of a kernel that calls this one asks."""
-        return self._inner.get_overload(signature)
+        return self.inner.get_overload(signature)

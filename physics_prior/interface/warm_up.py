@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from physics_prior.dynamics.beside import derivatives_beside
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.interface.output import Output
 from physics_prior.recording.simulate import motion
@@ -18,6 +19,11 @@ def warm_up(scene: Scene) -> None:
     where the kernels are not in the cache on disk, a tenth of a second where they are.
     """
     estimator = Estimator(scene)
+    with derivatives_beside(estimator.simulator.step):
+        _run(scene, estimator)
+
+
+def _run(scene: Scene, estimator: Estimator) -> None:
     start = next(motion(scene, estimator.simulator))
     for index in range(STAMPS):
         for measurement in start.measurements:

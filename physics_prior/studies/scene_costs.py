@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
-from time import process_time
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ SCENES = ("free_body", "double_pendulum", "walk_lemouel")
 def run_scene_costs(progress: Callable[[float, str], None] = lambda done, what: None) -> dict[str, Any]:
     """What each of SCENES costs: ``scenes``, a list of figures.
 
-    ``compilation_s``: time of a core, which what else runs does not lengthen, until estimates can be made, from a cold cache;
+    ``compilation_s``: until estimates can be made, from a cold cache, by two processes where there are cores for them;
     ``us_per_step``: of the scene's own step, from its start on.
 
     Raises:
@@ -42,9 +42,9 @@ def run_scene_costs(progress: Callable[[float, str], None] = lambda done, what: 
 def scene_cost(name: str) -> dict[str, Any]:
     """The figures of a scene, whose kernels are compiled now if they have not been before."""
     scene = load_scene(name)
-    begun = process_time()
+    begun = perf_counter()
     warm_up(scene)
-    compilation = process_time() - begun
+    compilation = perf_counter() - begun
     return {
         "freedoms": scene.tree.nv,
         "effects": len(scene.effects),
@@ -60,7 +60,7 @@ def table(figures: dict[str, Any]) -> str:
         f" | {each['us_per_step']:.2f} us |"
         for each in figures["scenes"]
     ]
-    head = "| scene | degrees of freedom | effects | compilation from a cold cache, of a core | a step |"
+    head = "| scene | degrees of freedom | effects | compilation from a cold cache | a step |"
     return "\n".join([head, "|---|---|---|---|---|", *rows])
 
 

@@ -54,7 +54,7 @@ def texts(tmp_path, replayed):
     """The words of the picture: an SVG repeats each as a comment."""
     path = tmp_path / "picture.svg"
     plot_replay(replayed, path)
-    return path.read_text()
+    return path.read_text(encoding="utf-8")
 
 
 def test_what_a_reader_needs_is_written(tmp_path):

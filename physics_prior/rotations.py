@@ -68,8 +68,10 @@ def exp(rotation_vector: ArrayLike) -> Array:
     """Return the quaternion, shape (..., 4), of a rotation vector, shape (..., 3), axis times angle, rad."""
     rotation_vector = np.asarray(rotation_vector, dtype=float)
     half_angle = 0.5 * np.linalg.norm(rotation_vector, axis=-1, keepdims=True)
-    # NumPy's sinc(t) is sin(pi t) / (pi t), and 1 at zero
-    return np.concatenate([np.cos(half_angle), 0.5 * np.sinc(half_angle / np.pi) * rotation_vector], axis=-1)
+    # of the same argument as the cosine: NumPy's sinc rounds its own, by as much as many turns make of it
+    zero = half_angle == 0.0
+    sine_over = np.where(zero, 1.0, np.sin(half_angle) / np.where(zero, 1.0, half_angle))
+    return np.concatenate([np.cos(half_angle), 0.5 * sine_over * rotation_vector], axis=-1)
 
 
 def log(q: ArrayLike) -> Array:

@@ -109,6 +109,12 @@ def test_exp_and_log_near_zero(length):
         np.testing.assert_allclose(rotations.log(-q), v, rtol=1e-14, atol=0.0)
 
 
+@pytest.mark.parametrize("length", [1e2, 14134.4, 1e6, 1e9])
+def test_exp_of_many_turns_is_a_rotation(length):
+    for axis in AXES:
+        assert abs(np.linalg.norm(rotations.exp(length * axis)) - 1.0) < 1e-15  # 2e-16
+
+
 @given(unit_quaternions, vectors)
 def test_a_quaternion_and_its_negative_are_one_rotation(q, v):
     np.testing.assert_array_equal(rotations.matrix_from_quaternion(q), rotations.matrix_from_quaternion(-q))

@@ -36,13 +36,19 @@ def coarsest(error: Callable[[int], float], order: int, allowed: float, most: Ca
     return n
 
 
-def first(allowed: Callable[[int], bool], count: int) -> int | None:
-    """The first of so many that is allowed, where all after it are too; None where none is."""
-    low, high = 0, count
+def first(error: Callable[[int], float], allowed: float, count: int) -> int | None:
+    """The first of so many, coarse to fine, whose error is allowed, where those of all after it are; None where none is.
+
+    But for the finest: where an error was told and it is infinite further on, rounding loses the motion, not coarseness.
+    """
+    low, high, found, told = 0, count, None, False
     while low < high:
         middle = (low + high) // 2
-        if allowed(middle):
+        own = error(middle)
+        if own <= allowed:
+            found = high = middle
+        elif told and not math.isfinite(own):
             high = middle
         else:
-            low = middle + 1
-    return low if low < count else None
+            low, told = middle + 1, told or math.isfinite(own)
+    return found

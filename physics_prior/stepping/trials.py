@@ -118,7 +118,7 @@ class Trials:
         self._report(f"trying {scheme.name}")
         if scheme.own_steps:
             # what chooses its own steps scatters: the next tolerance has to do, too
-            n = first(lambda i: max(self.error(scheme, i + 1), self.error(scheme, i + 2)) <= allowed, OWN_SETTINGS - 1)
+            n = first(lambda i: max(self.error(scheme, i + 1), self.error(scheme, i + 2)), allowed, OWN_SETTINGS - 1)
             return None if n is None else n + 1
         length = self._course.times[-1] / self._course.longest
 

@@ -55,7 +55,18 @@ def test_what_is_hopeless_is_given_up_at_once():
 def test_the_first_that_is_allowed():
     for count in range(6):
         for start in range(count + 1):
-            assert first(lambda n, start=start: n >= start, count) == (start if start < count else None)
+            errors = [1.0] * start + [0.0] * (count - start)
+            assert first(errors.__getitem__, 0.5, count) == (start if start < count else None)
+
+
+def test_the_finest_may_be_lost_to_rounding_and_the_coarsest_to_coarseness():
+    """As on four-bars, which no tolerance below 2e-12 gets past their fold."""
+    for coarse in range(4):
+        for window in range(1, 8):
+            errors = [math.inf] * coarse + [1.0] * 22 + [0.0] * window + [math.inf] * 8
+            assert first(errors.__getitem__, 0.5, len(errors)) == coarse + 22
+    assert first([1.0, 1.0, math.inf].__getitem__, 0.5, 3) is None
+    assert first([math.inf].__getitem__, 0.5, 1) is None
 
 
 def measured(scheme, error, us):

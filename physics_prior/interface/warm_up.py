@@ -24,6 +24,7 @@ def warm_up(scene: Scene) -> None:
 
 
 def _run(scene: Scene, estimator: Estimator) -> None:
+    """The stamps, what is estimated ahead of the last, and what is published of it."""
     start = next(motion(scene, estimator.simulator))
     for index in range(STAMPS):
         for measurement in start.measurements:

@@ -67,13 +67,13 @@ def test_another_process_is_asked_where_there_is_work_and_a_core_for_it(monkeypa
     step, started = Simulator(free_top, [Gravity()]).step, []
     begin = subprocess.Popen
 
-    def sleep(command, **settings):
-        started.append(begin([sys.executable, "-c", "import time; time.sleep(60)"], **settings))
+    def wait(command, **settings):
+        started.append(begin([sys.executable, "-c", "import signal; signal.pause()"], **settings))
         return started[-1]
 
     monkeypatch.setattr(os, "cpu_count", lambda: cores)
     monkeypatch.setattr(beside, "is_kept", lambda kernel: kept)
-    monkeypatch.setattr(subprocess, "Popen", sleep)
+    monkeypatch.setattr(subprocess, "Popen", wait)
     with beside.derivatives_beside(step):
         assert len(started) == asked
     assert all(process.poll() is not None for process in started)

@@ -27,14 +27,15 @@ SMALL_CORRECTION = 0.02  # rad or m: below it, one does
 QUORUM = 0.5  # of the markers of a frame: where the gate refuses more, the estimate is as suspect as they are
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)
 class Posterior:
     """What is known at a stamp after a measurement.
 
     Attributes:
         stamp: ns.
         state: the best state.
-        factor: (n, n) factor S of its covariance S S^T: lower after a prediction, any after an update.
+        factor: (n, n) factor S of its covariance S S^T: lower after a prediction, any after an update; (0, 0) where the
+            history has let it go, as another measurement of the stamp was told after it.
         accepted: stamp of the last measurement that was believed, ns.
         refused: how many the gate has refused since.
         used: whether the last one was believed; None where it said nothing or did not fit.

@@ -91,3 +91,30 @@ def test_an_empty_history_trims_to_nothing(shipped, filter_of):
     assert history.trim() == []
     assert not history
     assert not history.from_start
+
+
+def test_of_the_factors_of_a_stamp_only_the_last_is_kept_and_late_ones_change_no_bit(
+    every_source, filter_of, moments_of
+):
+    filter = filter_of(every_source)
+    first, *later = moments_of(every_source, duration=0.02)
+    measurements = [each for moment in later for each in moment.measurements]
+    assert len(first.measurements) == 4
+    prior = start(filter, first.measurements, first.stamp)
+
+    def rolled(order):
+        history = History(filter, SECOND)
+        history.begin(first.measurements, prior)
+        for index in order:
+            history.insert(measurements[index])
+        return history
+
+    expected = rolled(range(len(measurements)))
+    for history in [
+        expected,
+        *(rolled(np.random.default_rng(seed).permutation(len(measurements))) for seed in range(4)),
+    ]:
+        assert _factor(history) == _factor(expected)
+        for node, after in zip(history.nodes[4:], [*history.nodes[5:], None], strict=True):
+            last = after is None or after.measurement.stamp > node.measurement.stamp
+            assert len(node.posterior.factor) == (filter.process.n if last else 0)

@@ -171,7 +171,8 @@ def _forecast_errors(filter: Filter, nodes: Sequence[Node]) -> Iterator[float]:
         measurement = nodes[later].measurement
         if not filter.observes(measurement) or nodes[later].posterior.used is not True:
             continue
-        prediction = filter.predict(nodes[first].posterior, measurement.stamp)
+        last = int(np.searchsorted(stamps, stamps[first], side="right")) - 1  # of a stamp, knows all of it
+        prediction = filter.predict(nodes[last].posterior, measurement.stamp)
         filter.enter(prediction)
         seen = filter.innovation(measurement, prediction.state)
         yield from solve_triangular(seen.noise, seen.y, lower=True)

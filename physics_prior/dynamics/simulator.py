@@ -197,9 +197,15 @@ class Simulator:
         self.switches.begin(q, v)
 
     def displaced(self, q: np.ndarray, delta: np.ndarray) -> np.ndarray:
-        """(nq,) q moved by a tangent vector (nv,), as Tree.integrate does, compiled."""
+        """(nq,) q moved by a tangent vector (nv,), or what begins with one, as Tree.integrate does, compiled."""
         out = np.empty(self.nq)
         manifold.displace(self._links, q, delta, out)
+        return out
+
+    def difference(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """(nv,) the tangent vector that moves one configuration (nq,) to another, as Tree.difference, compiled."""
+        out = np.empty(self.nv)
+        manifold.difference(self._links, start, end, out)
         return out
 
     def constrain(self, q: np.ndarray, v: np.ndarray, factor: np.ndarray) -> None:

@@ -213,13 +213,14 @@ class Estimator:
 
     def _misplaced(self, measurement: Measurement) -> str:
         """Why a measurement finds no place; empty if it does."""
-        key, history, newest = self.filter.key(measurement), self.history, self._newest
-        if history.holds(measurement) or key in map(self.filter.key, self._early):
+        history, newest = self.history, self._newest
+        if history.ends_before(measurement):
+            lost = (measurement.stamp - newest) * 1e-9 > self.scene.health.lost_after
+            return "is so far ahead of all others that the estimate would be lost by then" if lost else ""
+        if history.holds(measurement) or self.filter.key(measurement) in map(self.filter.key, self._early):
             return "was doubled"
         if isinstance(measurement, SwitchCommand) and not history:
             return ""
-        if (measurement.stamp - newest) * 1e-9 > self.scene.health.lost_after and history:
-            return "is so far ahead of all others that the estimate would be lost by then"
         oldest = newest - START_WINDOW
         if history:
             oldest = history.nodes[0].measurement.stamp - START_WINDOW

@@ -5,6 +5,7 @@ will, and the same measurements give the same numbers in whatever order they cam
 """
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from physics_prior.scene import MeasurementSource, Scene
 
 ITERATIONS = 5  # of the update, where one linearisation does not do
 SMALL_CORRECTION = 0.02  # rad or m: below it, one does
+OF_EFFECTS = SwitchCommand, ForceMeasurement
 QUORUM = 0.5  # of the markers of a frame: where the gate refuses more, the estimate is as suspect as they are
 
 
@@ -84,6 +86,7 @@ class Filter:
         commands = {command_topic(label): index - len(labels) for index, label in enumerate(labels)}
         self.order = commands | {topic: index for index, topic in enumerate(self.sources)}
         self._limits: dict[int, float] = {}
+        self._here = np.zeros(simulator.nv)
 
     def predict(self, posterior: Posterior, stamp: int) -> Posterior:
         """The posterior carried to a later stamp, ns; SimulationError if it leaves the numbers or is too fast to follow."""
@@ -103,12 +106,12 @@ class Filter:
         state = posterior.state.copy()
         factor = self.process.predict(state, posterior.factor, h, count)
         require_followed(self.simulator, state.v, h)
-        return replace(self._fresh(posterior), stamp=stamp, state=state, factor=factor)
+        return self._fresh(posterior, stamp=stamp, state=state, factor=factor)
 
     @staticmethod
-    def _fresh(posterior: Posterior) -> Posterior:
-        """The posterior before a measurement has said anything."""
-        return replace(posterior, used=None, nis=0.0, dimension=0, log_determinant=0.0, start=False)
+    def _fresh(posterior: Posterior, **changes: Any) -> Posterior:
+        """The posterior, with changes, before a measurement has said anything."""
+        return replace(posterior, used=None, nis=0.0, dimension=0, log_determinant=0.0, start=False, **changes)
 
     def enter(self, posterior: Posterior) -> None:
         """Have the simulator hold what the posterior holds, at its time."""
@@ -131,11 +134,10 @@ class Filter:
     @staticmethod
     def observes(measurement: Measurement) -> bool:
         """Whether a measurement is of the configuration; the others tell what holds."""
-        return not isinstance(measurement, SwitchCommand | ForceMeasurement)
+        return not isinstance(measurement, OF_EFFECTS)
 
     def innovation(self, measurement: Measurement, state: State) -> Innovation:
         """The measurement, which must fit its source, against a state."""
-        self.simulator.move(state.q, state.v)
         return self._observers[measurement.topic].innovation(measurement, state.q)
 
     def gate_limit(self, dimension: int) -> float:
@@ -156,12 +158,12 @@ class Filter:
         seen = self.innovation(measurement, prior.state)
         if len(seen.y) == 0:
             return self._fresh(prior)
-        U, seen_errors = np.ascontiguousarray(prior.factor.T), seen.H.shape[1]
+        U, nv = np.ascontiguousarray(prior.factor.T), self.simulator.nv
         many, doubtful, partly = gated and len(seen.y) > seen.block, False, False
         astray, passed = prior.astray, None
         if many:
-            U = with_first(U, seen_errors)  # what is seen then depends on as many rows of U
-            believed = seen.squares(np.ascontiguousarray(U[:seen_errors, :seen_errors])) <= self.gate_limit(seen.block)
+            U = with_first(U, nv)  # what is seen then depends on as many rows of U
+            believed = seen.squares(np.ascontiguousarray(U[:nv, :nv])) <= self.gate_limit(seen.block)
             doubtful = float(np.mean(believed)) < QUORUM
             if seen.links is not None and not doubtful and (astray or not believed.all()):
                 patience = round(self.scene.health.degraded_after * 1e9)
@@ -171,7 +173,7 @@ class Filter:
             partly = not (doubtful or believed.all())
             if partly:
                 seen = seen.kept(believed)
-        gain = gain_of(U, seen)
+        gain = gain_of(U, seen, self._here)
         if doubtful or (gated and not many and not gain.nis <= self.gate_limit(len(seen.y))):
             return replace(
                 prior,
@@ -184,16 +186,15 @@ class Filter:
             )
         state = self.process.displace(prior.state, gain.correction)
         last = gain
-        for _ in range(ITERATIONS - 1 if gain.largest >= SMALL_CORRECTION else 0):
+        for _ in range(ITERATIONS - 1 if gain.change >= SMALL_CORRECTION else 0):
             seen = self.innovation(measurement, state)
             seen = seen.kept(believed) if partly else seen
-            from_prior = self.process.difference(prior.state, state)[:seen_errors]
-            last = gain_of(U, replace(seen, y=seen.y + seen.H @ from_prior))
+            last = gain_of(U, seen, self.simulator.difference(prior.state.q, state.q))
             state = self.process.displace(prior.state, last.correction)
-            # of what is seen: the rest, rates and forces, goes with it
-            if np.max(np.abs(last.correction[: len(from_prior)] - from_prior)) < 1e-3 * SMALL_CORRECTION:
+            if last.change < 1e-3 * SMALL_CORRECTION:  # of what is seen: the rest, rates and forces, goes with it
                 break
-        figures = gain if passed is None else gain_of(U, passed)  # a part found again is as surprising as a start
+        # a part found again is as surprising as a start
+        figures = gain if passed is None else gain_of(U, passed, self._here)
         state, factor = self.process.settle(state, last.factor())
         self.constrain(state, factor)
         return Posterior(

@@ -148,10 +148,9 @@ class ForcedProcess(OnManifold):
         return factor
 
     def displace(self, state: State, error: np.ndarray) -> State:
-        nv = self.nv
-        q = self.simulator.displaced(state.q, error[:nv])
-        force = state.force + error[2 * nv :]
-        return State(q, state.v + error[nv : 2 * nv], state.acceleration, force, state.grounded)
+        out = super().displace(state, error)
+        out.force = state.force + error[2 * self.nv :]
+        return out
 
     def difference(self, start: State, end: State) -> np.ndarray:
         return np.concatenate([super().difference(start, end), end.force - start.force])

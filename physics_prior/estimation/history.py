@@ -58,6 +58,10 @@ class History:
         self._keys = [self.filter.key(node.measurement) for node in self.nodes]
         self.begun = posterior.stamp
 
+    def ends_before(self, measurement: Measurement) -> bool:
+        """Whether a measurement comes after all others, as nearly all do."""
+        return bool(self._keys) and self.filter.key(measurement) > self._keys[-1]
+
     def holds(self, measurement: Measurement) -> bool:
         """Whether a measurement of this stamp and topic is there already."""
         key = self.filter.key(measurement)
@@ -71,7 +75,7 @@ class History:
     def insert(self, measurement: Measurement) -> None:
         """Put a measurement in its place, after the start, and roll on from there, or from where a factor is left."""
         key = self.filter.key(measurement)
-        place = bisect_left(self._keys, key)
+        place = len(self._keys) if key > self._keys[-1] else bisect_left(self._keys, key)
         before = self.nodes[place - 1].posterior
         self._keys.insert(place, key)
         self.nodes.insert(place, Node(measurement, before, before))
@@ -82,9 +86,11 @@ class History:
 
     def trim(self) -> list[Node]:
         """Drop and return the nodes older than the history's length, all but the newest of them: others roll from it."""
-        count = bisect_left(self._keys, (self._keys[-1][0] - self.length, 0)) - 1 if self._keys else 0
-        dropped = self.nodes[: max(count, 0)]
-        del self.nodes[: len(dropped)], self._keys[: len(dropped)]
+        if len(self._keys) < 2 or self._keys[1][0] >= self._keys[-1][0] - self.length:
+            return []
+        count = bisect_left(self._keys, (self._keys[-1][0] - self.length, 0)) - 1
+        dropped = self.nodes[:count]
+        del self.nodes[:count], self._keys[:count]
         return dropped
 
     def _roll(self, index: int) -> None:

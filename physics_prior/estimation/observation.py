@@ -15,13 +15,14 @@ from physics_prior.dynamics.algebra import (
     product,
     put3,
     rotation_of,
+    scale,
     times,
     transposed,
     transposed_times,
 )
 from physics_prior.dynamics.arrays import copy
 from physics_prior.dynamics.kernel import kernel
-from physics_prior.dynamics.kinematics import point_jacobian
+from physics_prior.dynamics.kinematics import point_jacobian, pose
 from physics_prior.dynamics.rotation_vector import vector_of
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.dynamics.types import Array, Records
@@ -46,7 +47,7 @@ from physics_prior.scene import (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Innovation:
     """A measurement against a state: y ~ H dx + noise, dx the tangent of q or other errors in a row.
 
@@ -119,7 +120,7 @@ class Observer(ABC):
     def innovation(self, measurement: Any, q: np.ndarray) -> Innovation:
         """A measurement, which must fit the source (``check``), against a configuration q (nq,).
 
-        The simulator's kinematics must be up to date (``move``). Rotations are compared in the tangent space of the expected
+        Where the simulator's links are is then known for that. Rotations are compared in the tangent space of the expected
         one, log(R_expected^T R_measured), in the measured frame's axes (Sola 2017, ch. 4). m may be 0, where no marker is seen.
         """
 
@@ -132,7 +133,7 @@ class PoseObserver(Observer):
         self._noise = np.diag(np.repeat([source.position_noise, source.orientation_noise], 3))
 
     def innovation(self, measurement: PoseMeasurement, q: np.ndarray) -> Innovation:
-        y, H = self._frame.seen(self._scale * measurement.position, measurement.orientation)
+        y, H = self._frame.seen(q, measurement.position, measurement.orientation, self._scale)
         if measurement.covariance is None:
             return Innovation(y, H, self._noise, 6)
         to_metres = np.repeat([self._scale, 1.0], 3)
@@ -147,7 +148,7 @@ class OrientationObserver(Observer):
         self._noise = source.orientation_noise * np.eye(3)
 
     def innovation(self, measurement: OrientationMeasurement, q: np.ndarray) -> Innovation:
-        y, H = self._frame.seen(NOWHERE, measurement.orientation)
+        y, H = self._frame.seen(q, NOWHERE, measurement.orientation)
         covariance = measurement.covariance
         return Innovation(y[3:], H[3:], self._noise if covariance is None else np.linalg.cholesky(covariance), 3)
 
@@ -169,7 +170,7 @@ class PointsObserver(Observer):
             rows = np.repeat(3 * seen, 3) + np.tile(np.arange(3), len(seen))
             links, places, points, noise = links[seen], places[seen], points[seen], noise[np.ix_(rows, rows)]
         y, H = np.empty(3 * len(seen)), np.empty((3 * len(seen), self._scratch.shape[1]))
-        see_points(self._memory.links, self._memory.work, links, places, points, y, H, self._scratch)
+        see_points(self._memory.links, self._memory.work, q, links, places, points, y, H, self._scratch)
         return Innovation(y, H, noise, 3, links=links)
 
 
@@ -195,14 +196,18 @@ class PartFrame:
     """A frame of a part, and what a measured pose says of it."""
 
     def __init__(self, source: PoseSource | OrientationSource, simulator: Simulator) -> None:
-        self._memory, self._nv = simulator.memory, simulator.nv
-        self._place = simulator.frame(source.part, source.frame.position, source.frame.orientation)
+        self._links, self._work = simulator.memory.links, simulator.memory.work
+        link, place, axes = simulator.frame(source.part, source.frame.position, source.frame.orientation)
+        self._place = link, place, axes.reshape(-1)
+        self._scratch = np.empty((6, simulator.nv))
 
-    def seen(self, position: np.ndarray, orientation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The innovation y (6,) and H (6, nv) of a measured position (3,) and orientation (4,)."""
-        y, H = np.empty(6), np.empty((6, self._nv))
-        see_frame(self._memory.links, self._memory.work, *self._place, position, orientation, y, H)
-        return y, H
+    def seen(
+        self, q: np.ndarray, position: np.ndarray, orientation: np.ndarray, unit: float = 1.0
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The innovation y (6,) and H (6, nv) of a measured position (3,), in units of so many m, and orientation (4,)."""
+        y, by_error = np.empty(6), np.empty((self._scratch.shape[1], 6))
+        see_frame(self._links, self._work, q, *self._place, position, orientation, unit, y, by_error, self._scratch)
+        return y, by_error.T
 
 
 NOWHERE = np.zeros(3)
@@ -219,34 +224,44 @@ OBSERVERS: dict[type[MeasurementSource], Any] = {
 def see_frame(
     links: Records,
     work: Records,
+    q: Array,
     link: int,
     place: Array,
     axes: Array,
     position: Array,
     orientation: Array,
+    unit: float,
     y: Array,
     H: Array,
+    scratch: Array,
 ) -> None:
-    """Fill y (6,) and H (6, nv) with what a measured pose says of the frame at place (3,) with axes (3, 3) on a link."""
-    point_jacobian(links, work, link, place, H)
-    p, R = get3(place), get9(axes.reshape(-1))
+    """Fill y (6,) and H (nv, 6), transposed, with what a measured pose says at q of the frame at place (3,) on a link.
+
+    axes (9,): of the frame; unit: of the position, m; scratch (6, nv).
+    """
+    pose(links, work, q)
+    point_jacobian(links, work, link, place, scratch)
+    p, R = get3(place), get9(axes)
     if link >= 0:
         here = work[link]
         p, R = plus(get3(here.origin), times(get9(here.rotation), p)), product(get9(here.rotation), R)
     seen = rotation_of(orientation[0], orientation[1], orientation[2], orientation[3])
-    put3(y[:3], minus(get3(position), p))
+    put3(y[:3], minus(scale(unit, get3(position)), p))
     put3(y[3:], vector_of(product(transposed(R), seen)))
-    for k in range(H.shape[1]):
-        turn, shift = (H[0, k], H[1, k], H[2, k]), (H[3, k], H[4, k], H[5, k])
-        put3(H[:3, k], shift)
-        put3(H[3:, k], transposed_times(R, turn))
+    for k in range(H.shape[0]):
+        put3(H[k, :3], (scratch[3, k], scratch[4, k], scratch[5, k]))
+        put3(H[k, 3:], transposed_times(R, (scratch[0, k], scratch[1, k], scratch[2, k])))
 
 
 @kernel
 def see_points(
-    links: Records, work: Records, on: Array, places: Array, points: Array, y: Array, H: Array, scratch: Array
+    links: Records, work: Records, q: Array, on: Array, places: Array, points: Array, y: Array, H: Array, scratch: Array
 ) -> None:
-    """Fill y (3 k,) and H (3 k, nv) with what measured points (k, 3) say of places (k, 3) on links (k,); scratch (6, nv)."""
+    """Fill y (3 k,) and H (3 k, nv) with what measured points (k, 3) say at q of places (k, 3) on links (k,).
+
+    scratch (6, nv).
+    """
+    pose(links, work, q)
     for i in range(points.shape[0]):
         p, link = get3(places[i]), on[i]
         point_jacobian(links, work, link, places[i], scratch)

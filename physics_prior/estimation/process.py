@@ -14,7 +14,6 @@ import numpy as np
 
 from physics_prior.dynamics.covariance import carry, carry_step
 from physics_prior.dynamics.force_noise import PointForces
-from physics_prior.dynamics.manifold import difference
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.errors import SimulationError
 from physics_prior.estimation import events
@@ -22,7 +21,7 @@ from physics_prior.estimation.square_root import lower_factor, reduced
 from physics_prior.scene import Scene
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, slots=True)
 class State:
     """A state on the manifold.
 
@@ -122,12 +121,11 @@ class OnManifold(ABC):
 
     def displace(self, state: State, error: np.ndarray) -> State:
         nv = self.simulator.nv
-        q = self.simulator.displaced(state.q, error[:nv])
-        return State(q, state.v + error[nv : 2 * nv], state.acceleration + error[2 * nv :])
+        q, v = self.simulator.displaced(state.q, error), state.v + error[nv : 2 * nv]
+        return State(q, v, state.acceleration, state.force, state.grounded)
 
     def difference(self, start: State, end: State) -> np.ndarray:
-        turn = np.empty(self.simulator.nv)
-        difference(self.simulator.memory.links, start.q, end.q, turn)
+        turn = self.simulator.difference(start.q, end.q)
         return np.concatenate([turn, end.v - start.v, end.acceleration - start.acceleration])
 
 
@@ -222,3 +220,8 @@ class KinematicProcess(OnManifold):
         F[index, 2 * nv + index] = 0.5 * h * h
         moments = np.array([[h**5 / 20, h**4 / 8, h**3 / 6], [h**4 / 8, h**3 / 3, h**2 / 2], [h**3 / 6, h**2 / 2, h]])
         return F, np.kron(np.linalg.cholesky(moments), np.diag(self.scene.noise.jerk))
+
+    def displace(self, state: State, error: np.ndarray) -> State:
+        out = super().displace(state, error)
+        out.acceleration = state.acceleration + error[2 * self.simulator.nv :]
+        return out

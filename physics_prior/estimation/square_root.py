@@ -1,14 +1,12 @@
-"""The square root of a covariance P = S S^T, told of a measurement.
+"""The square root of a covariance P = S S^T, and what a measurement is against it.
 
 S is kept in Fortran's order, so that its transpose U, which the kernels reflect (dynamics/covariance.py), is in C's.
 """
 
-import math
-
 import numpy as np
 
-from physics_prior.dynamics.arrays import accumulate, add_product, clear
-from physics_prior.dynamics.covariance import add_rows, triangularise
+from physics_prior.dynamics.arrays import add_product
+from physics_prior.dynamics.covariance import triangularise
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.types import Array
 from physics_prior.estimation.blocked import scratch_size, triangularise_in_blocks
@@ -44,94 +42,6 @@ def with_first(U: np.ndarray, count: int) -> np.ndarray:
     out = U.copy()
     triangularise(out, count, np.empty(2 * len(U)))
     return out
-
-
-@kernel
-def innovate(
-    U: Array, H: Array, first: int, noise: Array, y: Array, T: Array, scratch: Array, correction: Array
-) -> tuple[float, float, float]:
-    """Tell a factor U (n, n), P = U^T U, of an innovation y (m,), to which the rows of H (h, m) make h errors; fill T.
-
-    first: of these errors. Return the squared length of y, whitened, the logarithm of the determinant of its covariance, and
-    the largest correction of these errors; fill the correction (n,), gain times y. noise (m, m): a lower factor.
-    Reflections turn T = [[noise^T, 0], [U H^T, U]], (m + n, m + n), into [[factor of the innovation's covariance, its product
-    with the gain], [0, factor of the posterior]], all transposed. scratch (2 m + 2 n,).
-    """
-    m, n, end = H.shape[1], U.shape[0], first + H.shape[0]
-    for i in range(m):
-        row = T[i]
-        for j in range(m):
-            row[j] = noise[j, i]
-        for j in range(n):
-            row[m + j] = 0.0
-    for k in range(n):
-        row, own = T[m + k], U[k]
-        for j in range(m):
-            row[j] = 0.0
-        for j in range(n):
-            row[m + j] = own[j]
-        add_rows(own[first:end], H, row)
-    triangularise(T, m, scratch)
-    nis, determinant = whiten_by(T, y, scratch)
-    clear(correction)
-    for i in range(m):
-        accumulate(scratch[i], T[i, m:], correction)
-    largest = 0.0
-    for j in range(first, end):
-        largest = max(largest, abs(correction[j]))
-    return nis, determinant, largest
-
-
-@kernel
-def correct(
-    U: Array, H: Array, first: int, y: Array, T: Array, scratch: Array, correction: Array
-) -> tuple[float, float, float]:
-    """Do so without finding the posterior's factor, for noise of unit covariance; T (m + n, m) is scratch.
-
-    With R^T R the innovation's covariance the correction is P H^T (R^T R)^-1 y.
-    """
-    m, n, h = H.shape[1], U.shape[0], H.shape[0]
-    clear(T)
-    for i in range(m):
-        T[i, i] = 1.0
-    for k in range(n):
-        add_rows(U[k, first : first + h], H, T[m + k])
-    triangularise(T, m, scratch)
-    nis, determinant = whiten_by(T, y, scratch)
-    for i in range(m - 1, -1, -1):
-        for j in range(i + 1, m):
-            scratch[i] -= T[i, j] * scratch[j]
-        scratch[i] /= T[i, i]
-    x, e = scratch[:m], scratch[m : m + h]
-    for j in range(h):
-        e[j] = 0.0
-        for i in range(m):
-            e[j] += H[j, i] * x[i]
-    clear(correction)
-    for k in range(n):
-        share = 0.0
-        for j in range(h):
-            share += U[k, first + j] * e[j]
-        accumulate(share, U[k], correction)
-    largest = 0.0
-    for j in range(first, first + h):
-        largest = max(largest, abs(correction[j]))
-    return nis, determinant, largest
-
-
-@kernel
-def whiten_by(T: Array, y: Array, out: Array) -> tuple[float, float]:
-    """Fill the first m of out with R^-T y, y (m,), R upper in T (m, m): return its square, and the logarithm of det R^T R."""
-    nis, determinant = 0.0, 0.0
-    for i in range(y.shape[0]):
-        white = y[i]
-        for j in range(i):
-            white -= T[j, i] * out[j]
-        white /= T[i, i]
-        out[i] = white
-        nis += white * white
-        determinant += 2.0 * math.log(T[i, i])
-    return nis, determinant
 
 
 @kernel

@@ -45,7 +45,7 @@ def keep_still(process: "ForcedProcess", state: State, factor: np.ndarray, secon
         system = (memory.links, memory.work, process.unknown.soles, process.unknown.feet.index(foot))
         tell_slip(*system, share, y[own], H[own], corners, J, scratch)
     noise = STILL / np.sqrt(seconds) * np.eye(len(y))
-    gain = gain_of(np.ascontiguousarray(factor.T), Innovation(y, H, noise, 6, nv))
+    gain = gain_of(np.ascontiguousarray(factor.T), Innovation(y, H, noise, 6, nv), np.zeros(nv))
     there = process.displace(state, gain.correction)
     state.q[:], state.v[:], state.force[:] = there.q, there.v, there.force
     return gain.factor()

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from physics_prior.dynamics import kinematics, manifold
+from physics_prior.dynamics import manifold
 from physics_prior.errors import SimulationError
 from physics_prior.estimation import gain, observation
 from physics_prior.estimation.estimator import Estimator
@@ -140,9 +140,9 @@ def _split(scene: Scene, recording: list[Moment]) -> dict[str, float]:
     with ExitStack() as stack:
         for place, name in (
             (simulator.step, "carry"),
-            (gain, "innovate"),
+            (gain, "reflect"),
+            (gain, "apply"),
             (observation, "see_frame"),
-            (kinematics, "move"),
             (manifold, "displace"),
         ):
             stack.enter_context(_replaced(place, name, split.around(name, getattr(place, name))))
@@ -160,7 +160,7 @@ def _split(scene: Scene, recording: list[Moment]) -> dict[str, float]:
             measurement_of(source_of[topic], decode(source_of[topic].message_types[0], data), scene)
     messages = (thread_time_ns() - start) / 1e3
     count = len(recording) - SETTLED
-    covariance = split.us["innovate"] + split.us["carry"] - bare.us["carry"]
+    covariance = split.us["reflect"] + split.us["apply"] + split.us["carry"] - bare.us["carry"]
     dynamics = sum(split.us.values()) - covariance
     figures = (dynamics, covariance, total - dynamics - covariance)
     return dict(zip(SPLIT, [*(each / count for each in figures), messages / len(raw)], strict=True))

@@ -444,8 +444,8 @@ def test_an_update_is_repeated_until_what_is_seen_stays(scene, process, standing
     simulator = process.simulator
     passes = []
 
-    def counted(U, seen):
-        passes.append(gain_of(U, seen))
+    def counted(U, seen, about):
+        passes.append(gain_of(U, seen, about))
         return passes[-1]
 
     monkeypatch.setattr("physics_prior.estimation.filter.gain_of", counted)
@@ -461,7 +461,7 @@ def test_an_update_is_repeated_until_what_is_seen_stays(scene, process, standing
     seen = PointsMeasurement(0, "/markers", np.array(points))
     posterior = Filter(scene, simulator, process).update(prior, seen, gated=False)
     assert posterior.used
-    assert passes[0].largest > SMALL_CORRECTION
+    assert passes[0].change > SMALL_CORRECTION
     assert 2 <= len(passes) < ITERATIONS
 
 

@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from physics_prior.dynamics.covariance import carry_factor, triangularise
+from physics_prior.estimation.gain import gain_of
 from physics_prior.estimation.observation import Innovation
-from physics_prior.estimation.square_root import MANY, innovate, lower_factor, normalised_error, with_first
+from physics_prior.estimation.square_root import MANY, lower_factor, normalised_error, with_first
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -29,13 +30,9 @@ def _carry(F, S, G):
 
 def _update(S, H, noise, y):
     """NIS, correction and posterior factor, and the logarithm of the determinant of the innovation's covariance."""
-    n, m = len(S), len(y)
-    T, correction = np.empty((m + n, m + n)), np.empty(n)
-    nis, determinant, largest = innovate(
-        np.ascontiguousarray(S.T), np.ascontiguousarray(H.T), 0, noise, y, T, np.empty(2 * (m + n)), correction
-    )
-    assert largest == np.max(np.abs(correction[: H.shape[1]]))
-    return nis, correction, T[m:, m:].T, determinant
+    gain = gain_of(np.ascontiguousarray(S.T), Innovation(y, H, noise, len(y)), np.zeros(H.shape[1]))
+    assert gain.change == np.max(np.abs(gain.correction[: H.shape[1]]))
+    return gain.nis, gain.correction, gain.factor(), gain.log_determinant
 
 
 def _relative(difference, covariance):
@@ -103,6 +100,26 @@ def test_update_is_the_dense_one(seed, n, m, unseen):
     )
     assert _relative(posterior @ posterior.T - joseph, P) < 1e-13 * conditioning
     assert determinant == pytest.approx(np.linalg.slogdet(innovation)[1], rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("m", [3, 40])
+def test_an_innovation_found_elsewhere_corrects_as_if_found_at_the_prior(m):
+    """Of few rows, and of many, which are compressed first."""
+    rng = np.random.default_rng(m)
+    n, h = 9, 5
+    S, H, noise, y, about = (
+        _factor(rng, n, 0),
+        rng.normal(size=(m, h)),
+        np.eye(m),
+        rng.normal(size=m),
+        rng.normal(size=h),
+    )
+    U = np.ascontiguousarray(S.T)
+    here = gain_of(U, Innovation(y, H, noise, m), np.zeros(h))
+    there = gain_of(U, Innovation(y - H @ about, H, noise, m), about)
+    assert there.nis == pytest.approx(here.nis, rel=1e-12)
+    np.testing.assert_allclose(there.correction, here.correction, rtol=0, atol=1e-12)
+    assert there.change == np.max(np.abs(there.correction[:h] - about))
 
 
 def _frame(rng, n, blocks):

@@ -202,12 +202,6 @@ class Simulator:
         manifold.displace(self._links, q, delta, out)
         return out
 
-    def difference(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """(nv,) the tangent vector that moves one configuration (nq,) to another, as Tree.difference, compiled."""
-        out = np.empty(self.nv)
-        manifold.difference(self._links, start, end, out)
-        return out
-
     def constrain(self, q: np.ndarray, v: np.ndarray, factor: np.ndarray) -> None:
         """Put q and v, and the columns of a factor (2 nv, k) of their errors, onto the constraints, in place."""
         if self.rows:

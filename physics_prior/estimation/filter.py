@@ -158,12 +158,13 @@ class Filter:
         seen = self.innovation(measurement, prior.state)
         if len(seen.y) == 0:
             return self._fresh(prior)
-        U, nv = np.ascontiguousarray(prior.factor.T), self.simulator.nv
+        U = np.ascontiguousarray(prior.factor.T)
         many, doubtful, partly = gated and len(seen.y) > seen.block, False, False
         astray, passed = prior.astray, None
+        if len(seen.y) > seen.block:
+            U = with_first(U, self.simulator.nv)  # what is seen then depends on as many rows of U
         if many:
-            U = with_first(U, nv)  # what is seen then depends on as many rows of U
-            believed = seen.squares(np.ascontiguousarray(U[:nv, :nv])) <= self.gate_limit(seen.block)
+            believed = seen.squares(U) <= self.gate_limit(seen.block)
             doubtful = float(np.mean(believed)) < QUORUM
             if seen.links is not None and not doubtful and (astray or not believed.all()):
                 patience = round(self.scene.health.degraded_after * 1e9)
@@ -189,7 +190,7 @@ class Filter:
         for _ in range(ITERATIONS - 1 if gain.change >= SMALL_CORRECTION else 0):
             seen = self.innovation(measurement, state)
             seen = seen.kept(believed) if partly else seen
-            last = gain_of(U, seen, self.simulator.difference(prior.state.q, state.q))
+            last = gain_of(U, seen, self.process.tangent(prior.state, state))
             state = self.process.displace(prior.state, last.correction)
             if last.change < 1e-3 * SMALL_CORRECTION:  # of what is seen: the rest, rates and forces, goes with it
                 break

@@ -1,14 +1,14 @@
 """What a measurement would do to a state: the square-root update of one linearisation."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from physics_prior.estimation import frame, reflection
 from physics_prior.estimation.observation import Innovation
-from physics_prior.estimation.reflection import apply, reflect, work_size
-from physics_prior.estimation.square_root import compressed
 
-MANY = 24  # rows; fewer are told sooner than compressed
+MANY = 24  # rows; fewer are told sooner one by one
 
 
 @dataclass(eq=False, slots=True)
@@ -19,37 +19,45 @@ class Gain:
         nis: normalised innovation squared; log_determinant: of the innovation's covariance.
         change: by how much the errors that were seen differ at most from those that the innovation was found at.
         correction: (n,) error by which the state is corrected.
-        U, work: the factor of the state's errors, and how it is reflected (reflection.py) by so many rows.
+        factor: returns a factor (n, n) of the covariance afterwards, which only the last pass of an iterated update needs.
     """
 
     nis: float
     log_determinant: float
     change: float
     correction: np.ndarray
-    U: np.ndarray
-    work: np.ndarray
-    rows: int
-
-    def factor(self) -> np.ndarray:
-        """A factor (n, n) of the covariance afterwards, which only the last pass of an iterated update needs."""
-        out = np.empty_like(self.U)
-        apply(self.work, self.rows, self.U, out)
-        return out.T
+    factor: Callable[[], np.ndarray]
 
 
 def gain_of(U: np.ndarray, seen: Innovation, about: np.ndarray) -> Gain:
     """The gain of an innovation for a state whose errors have the factor U (n, n), P = U^T U.
 
-    about (h,): the errors of that state at which the innovation was found. Where there are many more rows than freedoms, a frame
-    of markers, they are first brought to as many as there are freedoms.
+    about (h,): the errors of that state at which the innovation was found. Of more rows than freedoms, a frame of markers, U has
+    to be triangular in its first h columns.
     """
-    y, H, noise, rest, of_noise = seen.y, seen.H, seen.noise, 0.0, 0.0
-    if len(y) >= MANY and len(y) > H.shape[1]:
-        H, y, rest = compressed(*seen.whitened)
-        of_noise = 2.0 * float(np.sum(np.log(np.diag(noise))))
-        noise = np.eye(len(y))
-    m, n = len(y), len(U)
-    work, correction = np.empty(work_size(m, n)), np.empty(n)
-    H = np.ascontiguousarray(H.T)
-    nis, determinant, change = reflect(U, H, seen.first, noise, y, about, work, correction)
-    return Gain(nis + rest, determinant + of_noise, change, correction, U, work, m)
+    if len(seen.y) >= MANY and len(seen.y) > seen.H.shape[1]:
+        return _of_frame(U, seen, about)
+    m, n = len(seen.y), len(U)
+    work, correction, H = np.empty(reflection.work_size(m, n)), np.empty(n), np.ascontiguousarray(seen.H.T)
+    figures = reflection.reflect(U, H, seen.first, seen.noise, seen.y, about, work, correction)
+
+    def factor() -> np.ndarray:
+        out = np.empty_like(U)
+        reflection.apply(work, m, U, out)
+        return out.T
+
+    return Gain(*figures, correction, factor)
+
+
+def _of_frame(U: np.ndarray, seen: Innovation, about: np.ndarray) -> Gain:
+    H, y = seen.whitened
+    m, h = H.shape
+    work, correction = np.empty(frame.work_size(m, h)), np.empty(len(U))
+    figures = frame.reflect_frame(U, H, seen.noise, y, about, work, correction)
+
+    def factor() -> np.ndarray:
+        out = np.empty_like(U)
+        frame.apply_frame(work, m, h, U, out)
+        return out.T
+
+    return Gain(*figures, correction, factor)

@@ -27,6 +27,7 @@ from physics_prior.dynamics.rotation_vector import vector_of
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.dynamics.types import Array, Records
 from physics_prior.errors import MeasurementError
+from physics_prior.estimation.frame import block_squares, work_size
 from physics_prior.estimation.measurement import (
     ForceMeasurement,
     JointsMeasurement,
@@ -35,7 +36,7 @@ from physics_prior.estimation.measurement import (
     PointsMeasurement,
     PoseMeasurement,
 )
-from physics_prior.estimation.square_root import block_squares, whiten
+from physics_prior.estimation.square_root import whiten
 from physics_prior.model import JointKind
 from physics_prior.scene import (
     JointSource,
@@ -80,10 +81,10 @@ class Innovation:
         return H, y
 
     def squares(self, U: np.ndarray) -> np.ndarray:
-        """(m / block,) normalised innovation squared of each block alone; U (h, h), triangular: these errors' P = U^T U."""
-        out, h = np.empty(len(self.y) // self.block), self.H.shape[1]
-        T, scratch = np.empty((self.block + h, self.block)), np.empty(h + 2 * self.block)
-        block_squares(*self.whitened, U, self.block, T, scratch, out)
+        """(m / block,) normalised innovation squared of each block alone; U (n, n), P = U^T U, triangular in what is seen."""
+        (H, y), k = self.whitened, self.block
+        out = np.empty(len(y) // k)
+        block_squares(H, y, U, np.empty(work_size(*H.shape)), np.empty((k, k)), np.empty(k), out)
         return out
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from physics_prior.dynamics.covariance import carry, carry_step
 from physics_prior.dynamics.force_noise import PointForces
+from physics_prior.dynamics.manifold import difference
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.errors import SimulationError
 from physics_prior.estimation import events
@@ -78,8 +79,11 @@ class Process(Protocol):
     def displace(self, state: State, error: np.ndarray) -> State:
         """The state moved by an error (n,)."""
 
+    def tangent(self, start: State, end: State) -> np.ndarray:
+        """The error (nv,) of the configuration that leads from one state to another."""
+
     def difference(self, start: State, end: State) -> np.ndarray:
-        """The error (n,) that leads from one state to another."""
+        """The error (n,) that does."""
 
 
 def steps(seconds: float, size: float) -> tuple[int, float]:
@@ -124,9 +128,13 @@ class OnManifold(ABC):
         q, v = self.simulator.displaced(state.q, error), state.v + error[nv : 2 * nv]
         return State(q, v, state.acceleration, state.force, state.grounded)
 
+    def tangent(self, start: State, end: State) -> np.ndarray:
+        out = np.empty(self.simulator.nv)
+        difference(self.simulator.memory.links, start.q, end.q, out)
+        return out
+
     def difference(self, start: State, end: State) -> np.ndarray:
-        turn = self.simulator.difference(start.q, end.q)
-        return np.concatenate([turn, end.v - start.v, end.acceleration - start.acceleration])
+        return np.concatenate([self.tangent(start, end), end.v - start.v, end.acceleration - start.acceleration])
 
 
 class WhiteForces:

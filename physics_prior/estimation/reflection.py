@@ -28,24 +28,26 @@ NARROW, WIDE = 8, 32  # numbers that stay in registers while others are added to
 def work_size(m: int, n: int) -> int:
     """Numbers that the reflections of m rows for n errors need."""
     width = m + -m % NARROW
-    return (2 * m + n) * width + width + 2 * m + n + m * n
+    return (2 * m + n) * width + width + 3 * m + n + m * n
 
 
 @inline_kernel
 def _sections(work: Array, m: int, n: int) -> Any:
-    """R (m, w), B (n, w), products (m, w), rows (m, n), and what only ``reflect`` needs: vectors (w,), (m,), (m,) and (n,).
+    """R (m, w), B (n, w), products (m, w), scales (m,), rows (m, n), and what only ``reflect`` needs: (w,), (m,), (m,) and (n,).
 
     Rows of w, the next multiple of NARROW, fill whole registers.
     """
     width = m + (NARROW - m % NARROW) % NARROW
     b = m * width
     p = b + n * width
-    r = p + m * width
+    c = p + m * width
+    r = c + m
     v = r + m * n
     return (
         array_at(work, 0, (m, width), FLOAT),
         array_at(work, b, (n, width), FLOAT),
         array_at(work, p, (m, width), FLOAT),
+        array_at(work, c, m, FLOAT),
         array_at(work, r, (m, n), FLOAT),
         array_at(work, v, width, FLOAT),
         array_at(work, v + width, m, FLOAT),
@@ -62,14 +64,15 @@ def reflect(
 
     It was found at the errors about (h,), so that y + H^T about meets the prior. Return the squared length of that, whitened,
     the logarithm of the determinant of its covariance, and the largest difference of these errors from where it was found;
-    fill the correction (n,) and, in work (``work_size``,), R, B, and the products of the columns of B above a diagonal of the
-    squared lengths of V's columns, halved and inverted. noise (m, m): a lower factor.
+    fill the correction (n,) and, in work (``work_size``,), R, B, the products of the columns of B above the diagonal, and the
+    scales of ``reflect_onto``. noise (m, m): a lower factor.
     """
     m, n, h = H.shape[1], U.shape[0], H.shape[0]
-    R, B, products, _, share, white, leads, z = _sections(work, m, n)
+    R, B, products, scales, _, share, white, leads, z = _sections(work, m, n)
     width = B.shape[1]
+    clear(R)
     for i in range(m):
-        for j in range(m):
+        for j in range(i, m):
             R[i, j] = noise[j, i]
     for begin in range(0, m, NARROW):
         some = min(m - begin, NARROW)
@@ -78,22 +81,7 @@ def reflect(
             for j in range(h):
                 own = fma(U[k, first + j], get_block(H, j * m + begin, NARROW, some), own)
             put_block(B, k * width + begin, own, NARROW)
-    for i in range(m):
-        _products_with(B, i, share)
-        head = R[i, i]
-        norm = math.sqrt(fma(head, head, share[i]))
-        leads[i], products[i, i] = head + norm, 1.0 / (norm * (norm + head))
-        for j in range(i + 1):
-            share[j] = 0.0
-        for j in range(i + 1, m):
-            share[j] = fma(leads[i], R[i, j], share[j]) * products[i, i]
-            R[i, j] = fma(leads[i], share[j], -R[i, j])  # turned over: the diagonal is positive
-        R[i, i] = norm
-        for begin in range(i - i % NARROW, m, NARROW):
-            taken = get_block(share, begin, NARROW, NARROW)
-            for k in range(n):
-                at = k * width + begin
-                put_block(B, at, fma(-B[k, i], taken, get_block(B, at, NARROW, NARROW)), NARROW)
+    reflect_onto(R, B, share, leads, scales)
     copy(y, white)
     add_rows(about, H, white)
     nis, determinant = _whiten(R, white)
@@ -105,7 +93,7 @@ def reflect(
         total = -leads[i] * white[i]
         for j in range(i + 1, m):
             total = fma(-products[i, j], share[j], total)
-        share[i] = total * products[i, i]
+        share[i] = total * scales[i]
     for k in range(n):
         z[k] = 0.0
         for i in range(m):
@@ -122,17 +110,17 @@ def reflect(
 def apply(work: Array, m: int, U: Array, out: Array) -> None:
     """Fill out (n, n) with the posterior's factor, transposed, from what ``reflect`` has found of m rows for U."""
     n = U.shape[0]
-    _, B, products, rows, _, _, _, _ = _sections(work, m, n)
+    _, B, products, scales, rows, _, _, _, _ = _sections(work, m, n)
     narrow = n - n % WIDE
     for begin in range(0, narrow, WIDE):
-        _apply_to_columns(B, products, U, begin, WIDE, WIDE, rows, out)
+        _apply_to_columns(B, products, scales, U, begin, WIDE, WIDE, rows, out)
     for begin in range(narrow, n, NARROW):
-        _apply_to_columns(B, products, U, begin, NARROW, min(n - begin, NARROW), rows, out)
+        _apply_to_columns(B, products, scales, U, begin, NARROW, min(n - begin, NARROW), rows, out)
 
 
 @inline_kernel
 def _apply_to_columns(
-    B: Array, products: Array, U: Array, begin: int, count: int, some: int, rows: Array, out: Array
+    B: Array, products: Array, scales: Array, U: Array, begin: int, count: int, some: int, rows: Array, out: Array
 ) -> None:
     """Do so for some, at most count, columns."""
     m, n = rows.shape
@@ -142,12 +130,38 @@ def _apply_to_columns(
             own = fma(B[k, i], get_block(U, k * n + begin, count, some), own)
         for j in range(i):
             own = fma(-products[j, i], get_block(rows, j * n + begin, count, some), own)
-        put_block(rows, i * n + begin, products[i, i] * own, some)
+        put_block(rows, i * n + begin, scales[i] * own, some)
     for k in range(n):
         own = get_block(U, k * n + begin, count, some)
         for i in range(m):
             own = fma(-B[k, i], get_block(rows, i * n + begin, count, some), own)
         put_block(out, k * n + begin, own, some)
+
+
+@kernel
+def reflect_onto(R: Array, B: Array, share: Array, leads: Array, scales: Array) -> None:
+    """Bring R (m, w), upper triangular in its first m columns, with B (n, w) below it to an R with nothing below these columns.
+
+    The columns of B stay as the reflections' vectors, below the leads (m,) on the diagonal; scales (m,) are 2 over their squared
+    lengths. The diagonal of R is positive at the beginning and at the end. share (w,) is scratch; w a multiple of NARROW.
+    """
+    m, n, width = R.shape[0], B.shape[0], B.shape[1]
+    for i in range(m):
+        _products_with(B, i, share)
+        head = R[i, i]
+        norm = math.sqrt(fma(head, head, share[i]))
+        leads[i], scales[i] = head + norm, 1.0 / (norm * (norm + head))
+        for j in range(i + 1):
+            share[j] = 0.0
+        for j in range(i + 1, width):
+            share[j] = fma(leads[i], R[i, j], share[j]) * scales[i]
+            R[i, j] = fma(leads[i], share[j], -R[i, j])  # turned over: so the diagonal is positive
+        R[i, i] = norm
+        for begin in range(i - i % NARROW, width, NARROW):
+            taken = get_block(share, begin, NARROW, NARROW)
+            for k in range(n):
+                at = k * width + begin
+                put_block(B, at, fma(-B[k, i], taken, get_block(B, at, NARROW, NARROW)), NARROW)
 
 
 @inline_kernel

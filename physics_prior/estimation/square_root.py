@@ -60,49 +60,6 @@ def whiten(noise: Array, block: int, H: Array, y: Array) -> None:
             H[i, j] *= scale
 
 
-@kernel
-def block_squares(H: Array, y: Array, U: Array, block: int, T: Array, scratch: Array, out: Array) -> None:
-    """Fill out (k,) with the normalised innovation squared of each block of an innovation alone, H (k block, h), y (k block,).
-
-    Both are whitened: a block's covariance is 1 + s^T s with s = U H^T, of which reflections turn T (block + h, block) into a
-    factor, whose diagonal is 1 and more, however little is known. U (h, h): the triangular factor of those errors' covariance.
-    scratch (h + 2 block,).
-    """
-    h = H.shape[1]
-    for index in range(out.shape[0]):
-        first = block * index
-        for i in range(block):
-            for j in range(block):
-                T[i, j] = 1.0 if i == j else 0.0
-        for k in range(h):
-            row, own = T[block + k], U[k]
-            for i in range(block):
-                total, seen = 0.0, H[first + i]
-                for j in range(k, h):
-                    total += own[j] * seen[j]
-                row[i] = total
-        triangularise(T, block, scratch)
-        out[index] = 0.0
-        for i in range(block):
-            white = y[first + i]
-            for j in range(i):
-                white -= T[j, i] * scratch[j]
-            white /= T[i, i]
-            scratch[i] = white
-            out[index] += white * white
-
-
-def compressed(H: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """As few rows as H has columns that tell the same: whitened H (m, h), y (m,) -> Q^T H (h, h), Q^T y (h,) and what is left.
-
-    The rest of Q^T y, of the squared length that is returned, does not depend on the state (Bierman 1977, ch. 4).
-    """
-    m, h = H.shape
-    T = np.column_stack([H, y])
-    triangularise(T, h + 1, np.empty(m + h + 1))
-    return np.ascontiguousarray(T[:h, :h]), T[:h, h].copy(), float(T[h, h] ** 2)
-
-
 def deviations(S: np.ndarray) -> np.ndarray:
     """(n,) standard deviations of a factor S (n, n), to scale by: none less than rounding makes of the largest."""
     own = np.sqrt(np.sum(S * S, axis=1))

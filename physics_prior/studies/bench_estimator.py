@@ -17,7 +17,7 @@ from rich.table import Table
 
 from physics_prior.dynamics import manifold
 from physics_prior.errors import SimulationError
-from physics_prior.estimation import gain, observation
+from physics_prior.estimation import observation, reflection
 from physics_prior.estimation.estimator import Estimator
 from physics_prior.estimation.measurement import PointsMeasurement
 from physics_prior.interface.intake import measurement_of
@@ -140,8 +140,8 @@ def _split(scene: Scene, recording: list[Moment]) -> dict[str, float]:
     with ExitStack() as stack:
         for place, name in (
             (simulator.step, "carry"),
-            (gain, "reflect"),
-            (gain, "apply"),
+            (reflection, "reflect"),
+            (reflection, "apply"),
             (observation, "see_frame"),
             (manifold, "displace"),
         ):

@@ -28,7 +28,7 @@ def made_up(scene, count=40):
 def words(draw, result, tmp_path):
     path = tmp_path / "picture.svg"
     draw(result, path)
-    return path.read_text()
+    return path.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", ["double_pendulum", "free_body", "ball_on_rod", "walk_lemouel"])

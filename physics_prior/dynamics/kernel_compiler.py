@@ -52,6 +52,10 @@ class _EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
     """Machine code for Python."""
 
     def _optimize_final_module(self) -> None:
+        # what nobody else calls may lose arguments that it does not use, and be taken in where it is called but once
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == llvm.Linkage.linkonce_odr:
+                function.linkage = llvm.Linkage.internal
         # Numba runs a cheap optimisation first, which brings counts of references together: kernels count none
         passes, builder = self._codegen._module_pass_manager()
         passes.run(self._final_module, builder)

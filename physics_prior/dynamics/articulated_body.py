@@ -6,6 +6,8 @@ The inertias (``factorize``) and what runs through them (``accelerate``) are sep
 constraints, projections and derivatives run through the same factors.
 """
 
+from typing import Any
+
 from physics_prior.dynamics.algebra import (
     ZERO,
     add3,
@@ -22,10 +24,10 @@ from physics_prior.dynamics.algebra import (
     plus,
     put3,
     put6,
-    put9,
     scale,
     scale6,
     scale9,
+    sum9,
     symmetric_adjugate,
     symmetric_inverse,
     symmetric_product,
@@ -34,8 +36,18 @@ from physics_prior.dynamics.algebra import (
     transposed_times,
 )
 from physics_prior.dynamics.kernel import inline_kernel, kernel
-from physics_prior.dynamics.records import ALL, FREE, PRISMATIC, REVOLUTE
-from physics_prior.dynamics.types import Array, Matrix, Record, Records, Symmetric, Vector
+from physics_prior.dynamics.lanes import (
+    add_numbers,
+    elements,
+    integers,
+    numbers,
+    put_elements,
+    put_numbers,
+    those,
+    together,
+)
+from physics_prior.dynamics.records import ALL, FREE, PRISMATIC, REVOLUTE, SPHERICAL
+from physics_prior.dynamics.types import Array, Matrix, Records, Symmetric, Vector
 
 
 @inline_kernel
@@ -53,39 +65,6 @@ def crossed_mass(arm: Vector, M: Symmetric) -> Matrix:
         determinant(x, M[3], y, M[1]),
         determinant(x, M[4], y, M[2]),
     )
-
-
-@inline_kernel
-def shift_to_parent(up: Record, arm: Vector, J: Symmetric, H: Matrix, M: Symmetric) -> None:
-    """Add an articulated inertia about a joint to the parent link's, whose origin is ``arm`` before it."""
-    x, y, z = arm
-    # B = [arm]x H^T, so that the shifted J is J + B + B^T - [arm]x M [arm]x; the last falls to the mass
-    up.J[0] += fma(2.0, determinant(y, H[2], z, H[1]), J[0])
-    up.J[1] += J[1] + fma(y, H[5], fma(-z, H[4], determinant(z, H[0], x, H[2])))
-    up.J[2] += J[2] + fma(y, H[8], fma(-z, H[7], determinant(x, H[1], y, H[0])))
-    up.J[3] += fma(2.0, determinant(z, H[3], x, H[5]), J[3])
-    up.J[4] += J[4] + fma(z, H[6], fma(-x, H[8], determinant(x, H[4], y, H[3])))
-    up.J[5] += fma(2.0, determinant(x, H[7], y, H[6]), J[5])
-    for k in range(9):
-        up.H[k] += H[k]
-    shift_mass_to_parent(up, arm, M)
-
-
-@inline_kernel
-def shift_mass_to_parent(up: Record, arm: Vector, M: Symmetric) -> None:
-    """Add an articulated mass at a joint, all that a ball joint passes on, to the parent link's inertia."""
-    x, y, z = arm
-    s = crossed_mass(arm, M)
-    up.J[0] += fma(s[2], y, -(s[1] * z))
-    up.J[1] += fma(s[0], z, -(s[2] * x))
-    up.J[2] += fma(s[1], x, -(s[0] * y))
-    up.J[3] += fma(s[3], z, -(s[5] * x))
-    up.J[4] += fma(s[4], x, -(s[3] * y))
-    up.J[5] += fma(s[7], x, -(s[6] * y))
-    for k in range(9):
-        up.H[k] += s[k]
-    for k in range(6):
-        up.M[k] += M[k]
 
 
 @inline_kernel
@@ -117,38 +96,99 @@ def _minus_symmetric(m: Symmetric, u: Vector, w: Vector) -> Symmetric:
 @kernel
 def factorize(links: Records, work: Records) -> None:
     """Turn the rigid inertias that ``weigh`` left into the articulated ones of all links, inward."""
-    for step in range(links.shape[0] - 1, -1, -1):
+    step = links.shape[0]
+    while step > 0:
+        some = links[step - 1].together
+        step -= some
         i = links[step].visit
-        link, here = links[i], work[i]
-        J, H, M = get6(here.J), get9(here.H), get6(here.M)
-        if link.kind == REVOLUTE or link.kind == PRISMATIC:
-            s = get3(here.axis)
-            if link.kind == REVOLUTE:
-                n, f = symmetric_times(J, s), transposed_times(H, s)
-                D = 1.0 / dot(s, n)
+        link = links[i]
+        if link.kind == FREE:
+            put6(work[i].M_inverse, symmetric_inverse(_factorize_ball(work, i)))
+        elif some > 1:
+            where, up = those(links, step, some)
+            if link.kind == SPHERICAL:
+                _pass_mass_on(work, where, up, some, _factorize_ball(work, where))
             else:
-                n, f = times(H, s), symmetric_times(M, s)
-                D = 1.0 / dot(s, f)
-            put3(here.U_moment, n)
-            put3(here.U_force, f)
-            here.D = D
+                J, H, M = _factorize_axis(work, where, link.kind)
+                pass_inertia_on(work, where, up, some, J, H, M)
+        elif link.kind == SPHERICAL:
+            mass = _factorize_ball(work, i)
             if link.parent >= 0:
-                a, b = scale(D, n), scale(D, f)
-                J = _minus_symmetric(J, a, n)
-                M = _minus_symmetric(M, b, f)
-                H = minus_outer(H, a, f)
-                shift_to_parent(work[link.parent], get3(here.arm), J, H, M)
+                _pass_mass_on(work, i, link.parent, 1, mass)
         else:
-            adjugate, inverse = symmetric_adjugate(J)
-            C = symmetric_product(adjugate, H)
-            put6(here.J_inverse, scale6(inverse, adjugate))
-            put9(here.K, scale9(inverse, C))
-            M = _schur(M, H, C, inverse)
-            put6(here.M, M)
-            if link.kind == FREE:
-                put6(here.M_inverse, symmetric_inverse(M))
-            elif link.parent >= 0:
-                shift_mass_to_parent(work[link.parent], get3(here.arm), M)
+            moment, mixed, mass = _factorize_axis(work, i, link.kind)
+            if link.parent >= 0:
+                pass_inertia_on(work, i, link.parent, 1, moment, mixed, mass)
+
+
+@inline_kernel
+def _factorize_ball(work: Records, where: Any) -> Any:
+    """Factorize links on ball joints; return the masses that these pass on."""
+    inertia = numbers(work, "J", 21, where)
+    J, H, M = inertia[0:6], inertia[6:15], inertia[15:21]
+    adjugate, inverse = symmetric_adjugate(J)
+    C = symmetric_product(adjugate, H)
+    put_numbers(work, "J_inverse", where, scale6(inverse, adjugate) + scale9(inverse, C))
+    M = _schur(M, H, C, inverse)
+    put_numbers(work, "M", where, M)
+    return M
+
+
+@inline_kernel
+def _factorize_axis(work: Records, where: Any, kind: int) -> Any:
+    """Factorize links on joints with an axis; return the inertias J, H, M that these pass on."""
+    inertia = numbers(work, "J", 21, where)
+    J, H, M = inertia[0:6], inertia[6:15], inertia[15:21]
+    s = numbers(work, "axis", 3, where)
+    if kind == REVOLUTE:
+        n, f = symmetric_times(J, s), transposed_times(H, s)
+        D = 1.0 / dot(s, n)
+    else:
+        n, f = times(H, s), symmetric_times(M, s)
+        D = 1.0 / dot(s, f)
+    put_numbers(work, "U_moment", where, (n[0], n[1], n[2], f[0], f[1], f[2], D))
+    a, b = scale(D, n), scale(D, f)
+    return _minus_symmetric(J, a, n), minus_outer(H, a, f), _minus_symmetric(M, b, f)
+
+
+@inline_kernel
+def pass_inertia_on(work: Records, where: Any, up: Any, some: int, J: Any, H: Any, M: Any) -> None:
+    """Add articulated inertias about joints to those of the links that they hang on."""
+    arm = numbers(work, "arm", 3, where)
+    x, y, z = arm
+    s, (a, b, c, d, e, f) = crossed_mass(arm, M), _mass_about(arm, M)
+    # B = [arm]x H^T, so that the shifted J is J + B + B^T - [arm]x M [arm]x; the last is the mass's
+    moment = (
+        a + fma(2.0, determinant(y, H[2], z, H[1]), J[0]),
+        b + (J[1] + fma(y, H[5], fma(-z, H[4], determinant(z, H[0], x, H[2])))),
+        c + (J[2] + fma(y, H[8], fma(-z, H[7], determinant(x, H[1], y, H[0])))),
+        d + fma(2.0, determinant(z, H[3], x, H[5]), J[3]),
+        e + (J[4] + fma(z, H[6], fma(-x, H[8], determinant(x, H[4], y, H[3])))),
+        f + fma(2.0, determinant(x, H[7], y, H[6]), J[5]),
+    )
+    add_numbers(work, "J", up, some, moment + sum9(H, s) + M)
+
+
+@inline_kernel
+def _pass_mass_on(work: Records, where: Any, up: Any, some: int, M: Any) -> None:
+    """Add articulated masses at joints, all that ball joints pass on, to the inertias of the links that they hang on."""
+    arm = numbers(work, "arm", 3, where)
+    add_numbers(work, "J", up, some, _mass_about(arm, M) + crossed_mass(arm, M) + M)
+
+
+@inline_kernel
+def _mass_about(arm: Any, M: Any) -> Any:
+    """The matrix -[arm]x M [arm]x, symmetric."""
+    x, y, z = arm
+    s = crossed_mass(arm, M)
+    return (
+        fma(s[2], y, -(s[1] * z)),
+        fma(s[0], z, -(s[2] * x)),
+        fma(s[1], x, -(s[0] * y)),
+        fma(s[3], z, -(s[5] * x)),
+        fma(s[4], x, -(s[3] * y)),
+        fma(s[7], x, -(s[6] * y)),
+    )
 
 
 @inline_kernel
@@ -165,80 +205,114 @@ def accelerate(links: Records, work: Records, tau: Array, gravity: Array, vdot: 
 @kernel
 def gather(links: Records, work: Records, tau: Array) -> None:
     """Run all forces inward through the factors: what is left at each joint to accelerate it."""
-    for step in range(links.shape[0] - 1, -1, -1):
+    step = links.shape[0]
+    while step > 0:
+        some = links[step - 1].together
+        step -= some
         i = links[step].visit
-        link, here = links[i], work[i]
-        omega, center = get3(here.omega), get3(here.center)
-        own = scale(link.mass, cross(omega, cross(omega, center)))
-        moment = plus(get3(here.bias_moment), plus(get3(here.gyroscopic), cross(center, own)))
-        moment = minus(moment, get3(here.moment))
-        force = plus(get3(here.bias_force), minus(own, get3(here.force)))
-        n = link.v
-        if link.kind == REVOLUTE or link.kind == PRISMATIC:
-            u = tau[n] - dot(get3(here.axis), moment if link.kind == REVOLUTE else force)
-            here.u[0] = u
-            if link.parent >= 0:
-                angular, linear = get3(here.coriolis_angular), get3(here.coriolis_linear)
-                H, across, along = get9(here.H), get3(here.U_moment), get3(here.U_force)
-                # what the joint gives way by its own force and to what is carried
-                share = here.D * (u - dot(across, angular) - dot(along, linear))
-                carried = plus(symmetric_times(get6(here.J), angular), times(H, linear))
-                moment = plus(moment, plus(carried, scale(share, across)))
-                carried = plus(transposed_times(H, angular), symmetric_times(get6(here.M), linear))
-                force = plus(force, plus(carried, scale(share, along)))
-        else:
-            first = n + 3 if link.kind == FREE else n
-            torque = times(get9(here.rotation), (tau[first], tau[first + 1], tau[first + 2]))
-            u = minus(torque, moment)
+        link = links[i]
+        if link.kind == FREE:
+            n, here = link.v, work[i]
+            moment, force = _bias(links, work, i)
+            u = minus(times(get9(here.rotation), get3(tau[n + 3 : n + 6])), moment)
             put3(here.u, u)
-            moment = torque
             force = plus(force, transposed_times(get9(here.K), u))
-            if link.kind == FREE:
-                put3(here.bias_force, minus((tau[n], tau[n + 1], tau[n + 2]), force))
-            elif link.parent >= 0:
-                force = plus(force, symmetric_times(get6(here.M), get3(here.coriolis_linear)))
-        if link.parent >= 0:
-            up = work[link.parent]
-            moment = plus(moment, cross(get3(here.arm), force))
-            put3(up.bias_moment, plus(get3(up.bias_moment), moment))
-            put3(up.bias_force, plus(get3(up.bias_force), force))
+            put3(here.bias_force, minus(get3(tau[n : n + 3]), force))
+        elif some > 1:
+            where, up = those(links, step, some)
+            add_numbers(work, "bias_moment", up, some, _gather(links, work, tau, where, link.kind))
+        else:
+            wrench = _gather(links, work, tau, i, link.kind)
+            if link.parent >= 0:
+                add_numbers(work, "bias_moment", link.parent, 1, wrench)
+
+
+@inline_kernel
+def _bias(links: Records, work: Records, where: Any) -> tuple[Any, Any]:
+    """The wrenches against links' motion, about their joints: what hangs on them passed on, and their own."""
+    omega, center = numbers(work, "omega", 3, where), numbers(work, "center", 3, where)
+    own = scale(numbers(links, "mass", 1, where), cross(omega, cross(omega, center)))
+    wrenches = numbers(work, "bias_moment", 15, where)
+    moment = minus(plus(wrenches[0:3], plus(wrenches[6:9], cross(center, own))), wrenches[9:12])
+    return moment, plus(wrenches[3:6], minus(own, wrenches[12:15]))
+
+
+@inline_kernel
+def _gather(links: Records, work: Records, tau: Array, where: Any, kind: int) -> Any:
+    """Do so at joints of one kind; return the wrenches that they pass on: moments about what they hang on, and forces."""
+    moment, force = _bias(links, work, where)
+    n, linear = integers(links, "v", where), numbers(work, "coriolis_linear", 3, where)
+    if kind == SPHERICAL:
+        torque = times(numbers(work, "rotation", 9, where), elements(tau, 3, n))
+        u = minus(torque, moment)
+        put_numbers(work, "u", where, u)
+        moment = torque
+        force = plus(force, transposed_times(numbers(work, "K", 9, where), u))
+        force = plus(force, symmetric_times(numbers(work, "M", 6, where), linear))
+    else:
+        axis, angular = numbers(work, "axis", 3, where), numbers(work, "coriolis_angular", 3, where)
+        u = elements(tau, 1, n) - dot(axis, moment if kind == REVOLUTE else force)
+        put_numbers(work, "u", where, u)
+        inertia, column = numbers(work, "J", 21, where), numbers(work, "U_moment", 7, where)
+        J, H, M = inertia[0:6], inertia[6:15], inertia[15:21]
+        across, along, D = column[0:3], column[3:6], column[6]
+        # what the joint gives way by its own force and to what is carried
+        share = D * (u - dot(across, angular) - dot(along, linear))
+        moment = plus(moment, plus(plus(symmetric_times(J, angular), times(H, linear)), scale(share, across)))
+        carried = plus(transposed_times(H, angular), symmetric_times(M, linear))
+        force = plus(force, plus(carried, scale(share, along)))
+    return plus(moment, cross(numbers(work, "arm", 3, where), force)) + force
 
 
 @kernel
 def release(links: Records, work: Records, gravity: Array, end: int, vdot: Array) -> None:
     """Run what ``gather`` left at the joints outward: accelerations of the links whose column is before end."""
-    for i in range(links.shape[0]):
-        link, here = links[i], work[i]
+    step, still = 0, scale(-1.0, get3(gravity))
+    while step < links.shape[0]:
+        i, some = links[step].visit, together(links, step, end)
+        link, step = links[i], step + some
         if link.column >= end:
             continue
-        alpha, acceleration = ZERO, (-gravity[0], -gravity[1], -gravity[2])
-        if link.parent >= 0:
-            up = work[link.parent]
-            alpha = get3(up.alpha)
-            acceleration = plus(get3(up.acceleration), cross(alpha, get3(here.arm)))
-        acceleration = plus(acceleration, get3(here.coriolis_linear))
-        alpha = plus(alpha, get3(here.coriolis_angular))
-        n = link.v
-        if link.kind == REVOLUTE or link.kind == PRISMATIC:
-            rate = here.D * (here.u[0] - dot(get3(here.U_moment), alpha) - dot(get3(here.U_force), acceleration))
-            vdot[n] = rate
-            if link.kind == REVOLUTE:
-                alpha = plus(alpha, scale(rate, get3(here.axis)))
-            else:
-                acceleration = plus(acceleration, scale(rate, get3(here.axis)))
+        if link.kind == FREE:
+            n, here = link.v, work[i]
+            acceleration = symmetric_times(get6(here.M_inverse), get3(here.bias_force))
+            put3(vdot[n : n + 3], minus(acceleration, still))
+            alpha = minus(symmetric_times(get6(here.J_inverse), get3(here.u)), times(get9(here.K), acceleration))
+            put3(vdot[n + 3 : n + 6], transposed_times(get9(here.rotation), alpha))
+            put_numbers(work, "alpha", i, alpha + acceleration)
+        elif some > 1:
+            where, up = those(links, step - some, some)
+            base = numbers(work, "alpha", 6, up)
+            _release(links, work, where, link.kind, base[0:3], base[3:6], vdot)
+        elif link.parent >= 0:
+            over = numbers(work, "alpha", 6, link.parent)
+            _release(links, work, i, link.kind, over[0:3], over[3:6], vdot)
         else:
-            if link.kind == FREE:
-                acceleration = symmetric_times(get6(here.M_inverse), get3(here.bias_force))
-                vdot[n] = acceleration[0] + gravity[0]
-                vdot[n + 1] = acceleration[1] + gravity[1]
-                vdot[n + 2] = acceleration[2] + gravity[2]
-                n += 3
-            total = minus(symmetric_times(get6(here.J_inverse), get3(here.u)), times(get9(here.K), acceleration))
-            local = transposed_times(get9(here.rotation), minus(total, alpha))
-            vdot[n], vdot[n + 1], vdot[n + 2] = local
-            alpha = total
-        put3(here.alpha, alpha)
-        put3(here.acceleration, acceleration)
+            _release(links, work, i, link.kind, ZERO, still, vdot)
+
+
+@inline_kernel
+def _release(links: Records, work: Records, where: Any, kind: int, alpha: Any, acceleration: Any, vdot: Array) -> None:
+    """Do so at joints of one kind, the accelerations being those of what they hang on."""
+    n, coriolis = integers(links, "v", where), numbers(work, "coriolis_angular", 6, where)
+    acceleration = plus(acceleration, cross(alpha, numbers(work, "arm", 3, where)))
+    acceleration, alpha = plus(acceleration, coriolis[3:6]), plus(alpha, coriolis[0:3])
+    if kind == SPHERICAL:
+        turned = symmetric_times(numbers(work, "J_inverse", 6, where), numbers(work, "u", 3, where))
+        total = minus(turned, times(numbers(work, "K", 9, where), acceleration))
+        put_elements(vdot, n, transposed_times(numbers(work, "rotation", 9, where), minus(total, alpha)))
+        put_numbers(work, "alpha", where, total + acceleration)
+    else:
+        column, axis = numbers(work, "U_moment", 7, where), numbers(work, "axis", 3, where)
+        u = numbers(work, "u", 1, where)
+        rate = column[6] * (u - dot(column[0:3], alpha) - dot(column[3:6], acceleration))
+        put_elements(vdot, n, rate)
+        moved = scale(rate, axis)
+        if kind == REVOLUTE:
+            alpha = plus(alpha, moved)
+        else:
+            acceleration = plus(acceleration, moved)
+        put_numbers(work, "alpha", where, alpha + acceleration)
 
 
 @kernel
@@ -259,35 +333,53 @@ def load_joints(links: Records, work: Records, end: int, forces: Array) -> None:
 
 
 @kernel
-def pull(links: Records, work: Records, z: Array, begin: int, end: int, vdot: Array) -> None:
+def pull(links: Records, work: Records, z: Array, end: int, vdot: Array) -> None:
     """Run z (nv,) outward through the factors: fill vdot (nv,) = M^-1 tau, and the links' increments of acceleration.
 
-    Those of the links whose column is in [begin, end); the increments of what they hang on must be there.
+    Those of the links whose column is before end.
     """
-    for i in range(links.shape[0]):
-        link, here = links[i], work[i]
-        if link.column < begin or link.column >= end:
+    step = 0
+    while step < links.shape[0]:
+        i, some = links[step].visit, together(links, step, end)
+        link, step = links[i], step + some
+        if link.column >= end:
             continue
-        alpha, acceleration = ZERO, ZERO
-        if link.parent >= 0:
-            up = work[link.parent]
-            alpha = get3(up.delta_alpha)
-            acceleration = plus(get3(up.delta_acceleration), cross(alpha, get3(here.arm)))
-        n, k = link.v, link.column
-        if link.kind == REVOLUTE or link.kind == PRISMATIC:
-            rate = z[k] - here.D * (dot(get3(here.U_moment), alpha) + dot(get3(here.U_force), acceleration))
-            vdot[n] = rate
-            if link.kind == REVOLUTE:
-                alpha = plus(alpha, scale(rate, get3(here.axis)))
-            else:
-                acceleration = plus(acceleration, scale(rate, get3(here.axis)))
+        if link.kind == FREE:
+            n, k, here = link.v, link.column, work[i]
+            acceleration = get3(z[k : k + 3])
+            alpha = minus(get3(z[k + 3 : k + 6]), times(get9(here.K), acceleration))
+            put3(vdot[n : n + 3], acceleration)
+            put3(vdot[n + 3 : n + 6], transposed_times(get9(here.rotation), alpha))
+            put_numbers(work, "delta_alpha", i, alpha + acceleration)
+        elif some > 1:
+            where, up = those(links, step - some, some)
+            base = numbers(work, "delta_alpha", 6, up)
+            _pull(links, work, z, where, link.kind, base[0:3], base[3:6], vdot)
+        elif link.parent >= 0:
+            over = numbers(work, "delta_alpha", 6, link.parent)
+            _pull(links, work, z, i, link.kind, over[0:3], over[3:6], vdot)
         else:
-            if link.kind == FREE:
-                acceleration = (z[k], z[k + 1], z[k + 2])
-                vdot[n], vdot[n + 1], vdot[n + 2] = acceleration
-                n, k = n + 3, k + 3
-            total = minus((z[k], z[k + 1], z[k + 2]), times(get9(here.K), acceleration))
-            vdot[n], vdot[n + 1], vdot[n + 2] = transposed_times(get9(here.rotation), minus(total, alpha))
-            alpha = total
-        put3(here.delta_alpha, alpha)
-        put3(here.delta_acceleration, acceleration)
+            _pull(links, work, z, i, link.kind, ZERO, ZERO, vdot)
+
+
+@inline_kernel
+def _pull(
+    links: Records, work: Records, z: Array, where: Any, kind: int, alpha: Any, acceleration: Any, vdot: Array
+) -> None:
+    """Do so at joints of one kind, the increments being those of what they hang on."""
+    n, k = integers(links, "v", where), integers(links, "column", where)
+    acceleration = plus(acceleration, cross(alpha, numbers(work, "arm", 3, where)))
+    if kind == SPHERICAL:
+        total = minus(elements(z, 3, k), times(numbers(work, "K", 9, where), acceleration))
+        put_elements(vdot, n, transposed_times(numbers(work, "rotation", 9, where), minus(total, alpha)))
+        put_numbers(work, "delta_alpha", where, total + acceleration)
+    else:
+        column, axis = numbers(work, "U_moment", 7, where), numbers(work, "axis", 3, where)
+        rate = elements(z, 1, k) - column[6] * (dot(column[0:3], alpha) + dot(column[3:6], acceleration))
+        put_elements(vdot, n, rate)
+        moved = scale(rate, axis)
+        if kind == REVOLUTE:
+            alpha = plus(alpha, moved)
+        else:
+            acceleration = plus(acceleration, moved)
+        put_numbers(work, "delta_alpha", where, alpha + acceleration)

@@ -53,46 +53,6 @@ _define(operator.truediv, "fdiv", *_PAIRS)
 _define(operator.neg, "fneg", (BlockType,))
 
 
-@intrinsic(prefer_literal=True)
-def get_lanes(_typing_context: Any, records: Any, field: Any, index: Any, where: Any) -> Any:
-    """A block of a record's number, the index-th of a field, of the records (a tuple of indices) that are where."""
-    block = BlockType(where.count)
-
-    def build(context: Any, builder: Any, kinds: Any, arguments: Any) -> Any:
-        vector = context.get_value_type(block)(ir.Undefined)
-        for lane, place in enumerate(_places(context, builder, kinds.args, arguments)):
-            vector = builder.insert_element(vector, builder.load(place), LANE(lane))
-        return vector
-
-    return block(records, field, index, where), build
-
-
-@intrinsic(prefer_literal=True)
-def put_lanes(_typing_context: Any, records: Any, field: Any, index: Any, where: Any, block: Any) -> Any:
-    """Store a block as ``get_lanes`` reads it. Of records that are there more than once the last holds."""
-
-    def build(context: Any, builder: Any, kinds: Any, arguments: Any) -> Any:
-        for lane, place in enumerate(_places(context, builder, kinds.args, arguments)):
-            builder.store(builder.extract_element(arguments[4], LANE(lane)), place)
-        return context.get_dummy_value()
-
-    return types.void(records, field, index, where, block), build
-
-
-def _places(context: Any, builder: Any, kinds: Any, arguments: Any) -> list[Any]:
-    """Where the number stands in each of the records."""
-    record = kinds[0].dtype
-    offset = record.offset(kinds[1].literal_value) + 8 * kinds[2].literal_value
-    data = builder.bitcast(
-        context.make_array(kinds[0])(context, builder, arguments[0]).data, ir.IntType(8).as_pointer()
-    )
-    out = []
-    for each in cgutils.unpack_tuple(builder, arguments[3]):
-        byte = builder.add(builder.mul(each, each.type(record.size)), each.type(offset))
-        out.append(builder.bitcast(builder.gep(data, [byte]), DOUBLE.as_pointer()))
-    return out
-
-
 @intrinsic
 def lanes_of(_typing_context: Any, a: Any, b: Any, c: Any) -> Any:
     """A block of four numbers, the last zero."""
@@ -107,14 +67,41 @@ def lanes_of(_typing_context: Any, a: Any, b: Any, c: Any) -> Any:
     return block(types.float64, types.float64, types.float64), build
 
 
+@intrinsic
+def beside(_typing_context: Any, like: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
+    """A block of four numbers, if that is what it is to be like; if a number, the first."""
+
+    def build(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        if not isinstance(like, BlockType):
+            return arguments[1]
+        vector = context.get_value_type(like)(None)
+        for lane, each in enumerate(arguments[1:]):
+            vector = builder.insert_element(vector, each, LANE(lane))
+        return vector
+
+    return like(like, *[types.float64] * 4), build
+
+
 @intrinsic(prefer_literal=True)
 def lane(_typing_context: Any, block: Any, index: Any) -> Any:
-    """A number of a block, the index a constant."""
+    """A number of a block, the index a constant; a number is all lanes of itself."""
 
     def build(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        return builder.extract_element(arguments[0], LANE(index.literal_value))
+        return (
+            builder.extract_element(arguments[0], LANE(index.literal_value))
+            if isinstance(block, BlockType)
+            else arguments[0]
+        )
 
     return types.float64(block, index), build
+
+
+@intrinsic
+def nothing(_typing_context: Any, like: Any) -> Any:
+    """Zero, or a block of zeros, like another."""
+    return like(like), lambda context, _builder, _signature, _arguments: context.get_value_type(like)(
+        0.0 if like == types.float64 else None
+    )
 
 
 @intrinsic
@@ -131,6 +118,42 @@ def at_most(_typing_context: Any, a: Any, b: Any) -> Any:
 
     kinds = [each if isinstance(each, BlockType) else types.float64 for each in (a, b)]
     return types.boolean(*kinds), build
+
+
+@intrinsic
+def either(_typing_context: Any, a: Any, b: Any, x: Any, y: Any) -> Any:
+    """The number x where a is at most b, else y; or a block of such numbers."""
+    block = next((each for each in (a, b, x, y) if isinstance(each, BlockType)), None)
+
+    def build(_context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        if block is not None:
+            arguments = spread(builder, block, signature.args, arguments)
+        return builder.select(builder.fcmp_ordered("<=", arguments[0], arguments[1]), arguments[2], arguments[3])
+
+    kinds = [each if isinstance(each, BlockType) else types.float64 for each in (a, b, x, y)]
+    return (block or types.float64)(*kinds), build
+
+
+def _alone(function: str, meaning: str) -> Any:
+    """An intrinsic of one number or block, by the name that LLVM has for it."""
+
+    def build(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        kind = arguments[0].type
+        suffix = f"v{kind.count}f64" if isinstance(kind, ir.VectorType) else "f64"
+        called = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(kind, [kind]), f"llvm.{function}.{suffix}"
+        )
+        return builder.call(called, arguments)
+
+    def typed(_typing_context: Any, a: Any) -> Any:
+        return a(a), build
+
+    typed.__name__, typed.__doc__ = function, meaning
+    return intrinsic(typed)
+
+
+size = _alone("fabs", "The size of a number, or of those of a block.")
+root = _alone("sqrt", "The square root of a number, or of those of a block.")
 
 
 @intrinsic(prefer_literal=True)

@@ -21,7 +21,6 @@ from physics_prior.dynamics.algebra import (
 )
 from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.articulated_body import factorize, gather, load_joints, pull, release
-from physics_prior.dynamics.blocks import get_block, put_block
 from physics_prior.dynamics.constraint_errors import acceleration_error, direction, place
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import pose, weigh
@@ -139,11 +138,8 @@ def gather_rows(pairs: Records, rows: Array, offset: int, out: Array) -> None:
             y = answer[first + 1]
         if n > 2:
             z = answer[first + 2]
-        for k in range(begin, end, 16):
-            some = end - k
-            total = fma(x, get_block(a, k, 16, some), get_block(out, k, 16, some))
-            total = fma(z, get_block(c, k, 16, some), fma(y, get_block(b, k, 16, some), total))
-            put_block(out, k, total, some)
+        for k in range(begin, end):
+            out[k] = fma(z, c[k], fma(y, b[k], fma(x, a[k], out[k])))
 
 
 @kernel
@@ -151,7 +147,7 @@ def respond(links: Records, work: Records, pairs: Records, rows: Array, z: Array
     """Fill vdot (nv,) = M^-1 A^T answer, and the links' increments of acceleration. z (nv,) is scratch."""
     clear(z)
     gather_rows(pairs, rows, width(rows), z)
-    pull(links, work, z, 0, ALL, vdot)
+    pull(links, work, z, ALL, vdot)
 
 
 @kernel

@@ -5,8 +5,6 @@ the implicit midpoint rule, I (w+ - w) + h wm x I wm = 0 with wm = (w + w+)/2, k
 solution is what the semi-implicit step applies to links on ball and free joints, about the point that they turn about.
 """
 
-from typing import Any
-
 from physics_prior.dynamics.algebra import (
     cross,
     dot,
@@ -22,8 +20,9 @@ from physics_prior.dynamics.algebra import (
     symmetric_times,
     times,
 )
-from physics_prior.dynamics.blocks import at_most, get_lanes, put_lanes
+from physics_prior.dynamics.blocks import at_most
 from physics_prior.dynamics.kernel import inline_kernel, kernel
+from physics_prior.dynamics.lanes import numbers, put_numbers
 from physics_prior.dynamics.records import SPHERICAL
 from physics_prior.dynamics.spatial import inertia_about
 from physics_prior.dynamics.types import Matrix, Record, Records, Symmetric, Vector
@@ -88,36 +87,13 @@ def take_at_middle(links: Records, work: Records, step: float) -> None:
         if first < 0 or (begin > 0 and first == links[begin - 1].turning):
             break
         where = (first, links[min(begin + 1, last)].turning, links[min(begin + 2, last)].turning, end)
-        inertia = inertia_about(
-            lanes6(work, "inertia", where), get_lanes(links, "turning_mass", 0, where), lanes3(work, "center", where)
-        )
-        omega = lanes3(work, "omega", where)
+        mass, center = numbers(links, "turning_mass", 1, where), numbers(work, "center", 3, where)
+        inertia = inertia_about(numbers(work, "inertia", 6, where), mass, center)
+        omega = numbers(work, "omega", 3, where)
         middle = middle_rate(inertia, omega, step)
         start_torque = cross(omega, symmetric_times(inertia, omega))
         change = minus(cross(middle, symmetric_times(inertia, middle)), start_torque)
-        x, y, z = plus(lanes3(work, "gyroscopic", where), change)
-        put_lanes(work, "gyroscopic", 0, where, x)
-        put_lanes(work, "gyroscopic", 1, where, y)
-        put_lanes(work, "gyroscopic", 2, where, z)
-
-
-@inline_kernel
-def lanes3(work: Records, field: str, where: Any) -> Any:
-    """The vectors in a field of the links that are where, as blocks."""
-    return get_lanes(work, field, 0, where), get_lanes(work, field, 1, where), get_lanes(work, field, 2, where)
-
-
-@inline_kernel
-def lanes6(work: Records, field: str, where: Any) -> Any:
-    """The symmetric matrices in a field of the links that are where, as blocks."""
-    return (
-        get_lanes(work, field, 0, where),
-        get_lanes(work, field, 1, where),
-        get_lanes(work, field, 2, where),
-        get_lanes(work, field, 3, where),
-        get_lanes(work, field, 4, where),
-        get_lanes(work, field, 5, where),
-    )
+        put_numbers(work, "gyroscopic", where, plus(numbers(work, "gyroscopic", 3, where), change))
 
 
 @inline_kernel

@@ -1,5 +1,7 @@
 """Kinematics: where every link is, how it moves and what its velocity alone adds to its acceleration."""
 
+from typing import Any
+
 from physics_prior.dynamics.algebra import (
     IDENTITY,
     ZERO,
@@ -13,8 +15,6 @@ from physics_prior.dynamics.algebra import (
     plus,
     product,
     put3,
-    put6,
-    put9,
     rotated_diagonal,
     rotated_inertia,
     rotation_of,
@@ -23,7 +23,9 @@ from physics_prior.dynamics.algebra import (
     times,
 )
 from physics_prior.dynamics.arrays import clear
+from physics_prior.dynamics.blocks import nothing
 from physics_prior.dynamics.kernel import inline_kernel, kernel
+from physics_prior.dynamics.lanes import elements, integers, numbers, put_numbers, those, together
 from physics_prior.dynamics.records import ALL, FREE, PRISMATIC, REVOLUTE, SPHERICAL
 from physics_prior.dynamics.spatial import inertia_about
 from physics_prior.dynamics.trigonometry import sine_and_cosine
@@ -42,64 +44,75 @@ def move(links: Records, work: Records, q: Array, v: Array) -> None:
     flow(links, work, v)
 
 
-@inline_kernel
+@kernel
 def pose(links: Records, work: Records, q: Array) -> None:
     """Fill where the links are."""
-    pose_part(links, work, q, 0, ALL)
-
-
-@kernel
-def pose_part(links: Records, work: Records, q: Array, begin: int, end: int) -> None:
-    """Fill where the links are whose column is in [begin, end): those that constraints move come first, then the others."""
     work[0].factored = 0
-    for step in range(links.shape[0]):
-        i = links[step].visit
-        link, here = links[i], work[i]
-        if link.column < begin or link.column >= end:
-            continue
-        kind, k = link.kind, link.q
-        if kind == FREE:
-            arm = (q[k], q[k + 1], q[k + 2])
-            origin = arm
+    step = 0
+    while step < links.shape[0]:
+        i, some = links[step].visit, links[step].together
+        link = links[i]
+        if link.kind == FREE:
+            k, origin = link.q, get3(q[link.q : link.q + 3])
             R = rotation_of(q[k + 3], q[k + 4], q[k + 5], q[k + 6])
+            put_numbers(work, "rotation", i, R + origin + origin)
+        elif some > 1:
+            where, up = those(links, step, some)
+            over = numbers(work, "rotation", 12, up)
+            _pose(links, work, q, where, link.kind, link.turned, over[0:9], over[9:12])
+        elif link.parent >= 0:
+            base = numbers(work, "rotation", 12, link.parent)
+            _pose(links, work, q, i, link.kind, link.turned, base[0:9], base[9:12])
         else:
-            R, origin = IDENTITY, ZERO
-            if link.parent >= 0:
-                up = work[link.parent]
-                R, origin = get9(up.rotation), get3(up.origin)
-            arm = times(R, get3(link.position))
-            if link.turned:
-                R = product(R, get9(link.placement))
-            if kind == SPHERICAL:
-                R = product(R, rotation_of(q[k], q[k + 1], q[k + 2], q[k + 3]))
-            else:
-                axis = times(R, get3(link.axis))
-                put3(here.axis, axis)
-                if kind == REVOLUTE:
-                    R = turned_about(R, get3(link.axis), axis, q[k])
-                elif kind == PRISMATIC:
-                    arm = plus(arm, scale(q[k], axis))
-            origin = plus(origin, arm)
-        put9(here.rotation, R)
-        put3(here.arm, arm)
-        put3(here.origin, origin)
+            _pose(links, work, q, i, link.kind, link.turned, IDENTITY, ZERO)
+        step += some
+
+
+@inline_kernel
+def _pose(links: Records, work: Records, q: Array, where: Any, kind: int, turned: int, R: Any, origin: Any) -> None:
+    """Pose links on joints of one kind, R and the origin those of what they hang on."""
+    arm, k = times(R, numbers(links, "position", 3, where)), integers(links, "q", where)
+    if turned:
+        R = product(R, numbers(links, "placement", 9, where))
+    if kind == SPHERICAL:
+        w, x, y, z = elements(q, 4, k)
+        R = product(R, rotation_of(w, x, y, z))
+    else:
+        local, along = numbers(links, "axis", 3, where), elements(q, 1, k)
+        axis = times(R, local)
+        put_numbers(work, "axis", where, axis)
+        if kind == REVOLUTE:
+            R = turned_about(R, local, axis, along)
+        else:
+            arm = plus(arm, scale(along, axis))
+    put_numbers(work, "rotation", where, R + plus(origin, arm) + arm)
 
 
 @kernel
 def weigh(links: Records, work: Records) -> None:
     """Fill centres of mass and inertias of the links in world axes, those about their joints too; needs ``pose``."""
     work[0].factored = 0
-    for i in range(links.shape[0]):
-        link, here = links[i], work[i]
-        R = get9(here.rotation)
-        mass, center, inertia = link.mass, times(R, get3(link.center)), get6(link.inertia)
-        inertia = rotated_diagonal(R, inertia) if link.principal else rotated_inertia(R, inertia)
-        put3(here.center, center)
-        put6(here.inertia, inertia)
-        x, y, z = scale(mass, center)
-        put6(here.J, inertia_about(inertia, mass, center))
-        put9(here.H, (0.0, -z, y, z, 0.0, -x, -y, x, 0.0))
-        put6(here.M, (mass, 0.0, 0.0, mass, 0.0, mass))
+    step = 0
+    while step < links.shape[0]:
+        i, some = links[step].visit, links[step].together
+        if some > 1:
+            _weigh(links, work, those(links, step, some)[0], links[i].principal)
+        else:
+            _weigh(links, work, i, links[i].principal)
+        step += some
+
+
+@inline_kernel
+def _weigh(links: Records, work: Records, where: Any, principal: int) -> None:
+    """Weigh links that have their inertias in principal axes, or do not."""
+    R, inertia = numbers(work, "rotation", 9, where), numbers(links, "inertia", 6, where)
+    mass, center = numbers(links, "mass", 1, where), times(R, numbers(links, "center", 3, where))
+    inertia = rotated_diagonal(R, inertia) if principal else rotated_inertia(R, inertia)
+    x, y, z = scale(mass, center)
+    none = nothing(mass)
+    H = (none, -z, y, z, none, -x, -y, x, none)
+    M = (mass, none, none, mass, none, mass)
+    put_numbers(work, "inertia", where, inertia + inertia_about(inertia, mass, center) + H + M + center)
 
 
 @inline_kernel
@@ -111,44 +124,58 @@ def flow(links: Records, work: Records, v: Array) -> None:
 @kernel
 def flow_part(links: Records, work: Records, v: Array, end: int) -> None:
     """Do so for the links whose column is before end."""
-    for i in range(links.shape[0]):
-        link, here = links[i], work[i]
+    step = 0
+    while step < links.shape[0]:
+        i, some = links[step].visit, together(links, step, end)
+        link, step = links[i], step + some
         if link.column >= end:
             continue
-        kind, n = link.kind, link.v
-        omega, velocity = ZERO, ZERO
-        arm = get3(here.arm)
-        angular, linear = ZERO, ZERO
-        if link.parent >= 0:
-            up = work[link.parent]
-            omega, velocity = get3(up.omega), get3(up.velocity)
-            carried = cross(omega, arm)
-            velocity = plus(velocity, carried)
-            linear = cross(omega, carried)
+        if link.kind == FREE:
+            n, here = link.v, work[i]
+            omega = times(get9(here.rotation), get3(v[n + 3 : n + 6]))
+            _put_flow(work, i, omega, get3(v[n : n + 3]), ZERO, ZERO)
+        elif some > 1:
+            where, up = those(links, step - some, some)
+            over = numbers(work, "omega", 6, up)
+            _flow(links, work, v, where, link.kind, over[0:3], over[3:6])
+        elif link.parent >= 0:
+            base = numbers(work, "omega", 6, link.parent)
+            _flow(links, work, v, i, link.kind, base[0:3], base[3:6])
+        else:
+            _flow(links, work, v, i, link.kind, ZERO, ZERO)
+
+
+@inline_kernel
+def _flow(links: Records, work: Records, v: Array, where: Any, kind: int, omega: Any, velocity: Any) -> None:
+    """Move links on joints of one kind, omega and velocity those of what they hang on."""
+    n = integers(links, "v", where)
+    carried = cross(omega, numbers(work, "arm", 3, where))
+    velocity = plus(velocity, carried)
+    linear = cross(omega, carried)
+    if kind == PRISMATIC:
+        slide = scale(elements(v, 1, n), numbers(work, "axis", 3, where))
+        linear = plus(linear, scale(2.0, cross(omega, slide)))
+        _put_flow(work, where, omega, plus(velocity, slide), _nothing3(slide), linear)
+    else:
         if kind == REVOLUTE:
-            spin = scale(v[n], get3(here.axis))
-            angular = cross(omega, spin)
-            omega = plus(omega, spin)
-        elif kind == PRISMATIC:
-            slide = scale(v[n], get3(here.axis))
-            linear = plus(linear, scale(2.0, cross(omega, slide)))
-            velocity = plus(velocity, slide)
-        elif kind == SPHERICAL:
-            spin = times(get9(here.rotation), (v[n], v[n + 1], v[n + 2]))
-            angular = cross(omega, spin)
-            omega = plus(omega, spin)
-        elif kind == FREE:
-            velocity = (v[n], v[n + 1], v[n + 2])
-            omega = times(get9(here.rotation), (v[n + 3], v[n + 4], v[n + 5]))
-        put3(here.omega, omega)
-        put3(here.velocity, velocity)
-        put3(here.coriolis_angular, angular)
-        put3(here.coriolis_linear, linear)
-        put3(here.gyroscopic, cross(omega, symmetric_times(get6(here.inertia), omega)))
-        put3(here.moment, ZERO)
-        put3(here.force, ZERO)
-        put3(here.bias_moment, ZERO)
-        put3(here.bias_force, ZERO)
+            spin = scale(elements(v, 1, n), numbers(work, "axis", 3, where))
+        else:
+            spin = times(numbers(work, "rotation", 9, where), elements(v, 3, n))
+        _put_flow(work, where, plus(omega, spin), velocity, cross(omega, spin), linear)
+
+
+@inline_kernel
+def _put_flow(work: Records, where: Any, omega: Any, velocity: Any, angular: Any, linear: Any) -> None:
+    """Store velocities and what they add to accelerations, and begin the wrenches: gyroscopic torques, and nothing else."""
+    torque = cross(omega, symmetric_times(numbers(work, "inertia", 6, where), omega))
+    none = _nothing3(torque)
+    put_numbers(work, "omega", where, omega + velocity + angular + linear + none + none + torque + none + none)
+
+
+@inline_kernel
+def _nothing3(like: Any) -> Any:
+    """The vector of nothing, of numbers or of blocks."""
+    return nothing(like[0]), nothing(like[0]), nothing(like[0])
 
 
 @kernel

@@ -5,10 +5,13 @@ the coordinates theta of q = q0 [+] theta (Munthe-Kaas 1999), a plain vector spa
 """
 
 import math
+from typing import Any
 
-from physics_prior.dynamics.algebra import cross, dot, dot_on, fma, plus, scale
+from physics_prior.dynamics.algebra import cross, dot, dot_on, fma, get3, plus, put3, scale
+from physics_prior.dynamics.blocks import at_most, either, root, size
 from physics_prior.dynamics.kernel import inline_kernel, kernel
-from physics_prior.dynamics.records import ALL, FREE, SPHERICAL
+from physics_prior.dynamics.lanes import elements, integers, put_elements, those
+from physics_prior.dynamics.records import FREE, SPHERICAL
 from physics_prior.dynamics.rotation_vector import exponential, right_jacobian, rotation_back, second_coefficient
 from physics_prior.dynamics.types import Array, Records, Vector
 
@@ -38,37 +41,44 @@ def local_rate_by_theta(theta: Vector, omega: Vector, direction: Vector, exact: 
     return plus(plus(scale(0.5, turned), scale(c, twice)), change)
 
 
-@inline_kernel
+@kernel
 def displace(links: Records, q: Array, delta: Array, out: Array) -> None:
     """Fill out (nq,) = q [+] delta; q and out may be the same array. Quaternions leave with unit norm."""
-    displace_part(links, q, delta, 0, ALL, out)
-
-
-@kernel
-def displace_part(links: Records, q: Array, delta: Array, begin: int, end: int, out: Array) -> None:
-    """Do so for the links whose column is in [begin, end)."""
-    for i in range(links.shape[0]):
+    step = 0
+    while step < links.shape[0]:
+        i, some = links[step].visit, links[step].together
         link = links[i]
-        if link.column < begin or link.column >= end:
-            continue
         k, n = link.q, link.v
-        if link.kind == SPHERICAL or link.kind == FREE:
-            if link.kind == FREE:
-                for e in range(3):
-                    out[k + e] = q[k + e] + delta[n + e]
-                k, n = k + 3, n + 3
-            w, x, y, z = q[k], q[k + 1], q[k + 2], q[k + 3]
-            a, b, c, d = exponential(delta[n], delta[n + 1], delta[n + 2])
-            out0 = dot_on(w * a, -x, -y, -z, b, c, d)
-            out1 = dot_on(w * b, x, y, -z, a, d, c)
-            out2 = dot_on(w * c, -x, y, z, d, a, b)
-            out3 = dot_on(w * d, x, -y, z, c, b, a)
-            square = dot_on(out0 * out0, out1, out2, out3, out1, out2, out3)
-            # the root's first terms, exact where the norm is one but for rounding: always but for what a user gives
-            norm = fma(-0.5, square, 1.5) if abs(square - 1.0) < 1e-8 else 1.0 / math.sqrt(square)
-            out[k], out[k + 1], out[k + 2], out[k + 3] = out0 * norm, out1 * norm, out2 * norm, out3 * norm
+        if link.kind == FREE:
+            put3(out[k : k + 3], plus(get3(q[k : k + 3]), get3(delta[n : n + 3])))
+            _displace(q, delta, out, k + 3, n + 3, SPHERICAL)
+        elif some > 1:
+            where = those(links, step, some)[0]
+            _displace(q, delta, out, integers(links, "q", where), integers(links, "v", where), link.kind)
         else:
-            out[k] = q[k] + delta[n]
+            _displace(q, delta, out, k, n, link.kind)
+        step += some
+
+
+@inline_kernel
+def _displace(q: Array, delta: Array, out: Array, k: Any, n: Any, kind: int) -> None:
+    """Do so at joints of one kind, k and n being where they begin."""
+    if kind == SPHERICAL:
+        w, x, y, z = elements(q, 4, k)
+        turn = elements(delta, 3, n)
+        a, b, c, d = exponential(turn[0], turn[1], turn[2])
+        out0 = dot_on(w * a, -x, -y, -z, b, c, d)
+        out1 = dot_on(w * b, x, y, -z, a, d, c)
+        out2 = dot_on(w * c, -x, y, z, d, a, b)
+        out3 = dot_on(w * d, x, -y, z, c, b, a)
+        square = dot_on(out0 * out0, out1, out2, out3, out1, out2, out3)
+        # the root's first terms, exact where the norm is one but for rounding: always but for what a user gives
+        off, norm = size(square - 1.0), fma(-0.5, square, 1.5)
+        if not at_most(off, 1e-8):
+            norm = either(off, 1e-8, norm, 1.0 / root(square))
+        put_elements(out, k, (out0 * norm, out1 * norm, out2 * norm, out3 * norm))
+    else:
+        put_elements(out, k, elements(q, 1, k) + elements(delta, 1, n))
 
 
 @kernel

@@ -20,7 +20,7 @@ from physics_prior.dynamics.algebra import (
     transposed_times,
 )
 from physics_prior.dynamics.arrays import clear
-from physics_prior.dynamics.articulated_body import shift_to_parent
+from physics_prior.dynamics.articulated_body import pass_inertia_on
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kinematics import freedom, freedoms, weigh
 from physics_prior.dynamics.records import FREE, PRISMATIC, REVOLUTE
@@ -103,7 +103,7 @@ def mass_matrix(links: Records, work: Records, M: Array) -> None:
     for i in range(links.shape[0] - 1, -1, -1):
         if links[i].parent >= 0:
             here = work[i]
-            shift_to_parent(work[links[i].parent], get3(here.arm), get6(here.J), get9(here.H), get6(here.M))
+            pass_inertia_on(work, i, links[i].parent, 1, get6(here.J), get9(here.H), get6(here.M))
     for i in range(links.shape[0]):
         link = links[i]
         for c in range(freedoms(link.kind)):

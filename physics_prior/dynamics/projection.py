@@ -2,8 +2,8 @@
 
 import math
 
-from physics_prior.dynamics.algebra import ZERO
-from physics_prior.dynamics.arrays import accumulate, clear, copy, within
+from physics_prior.dynamics.algebra import ZERO, fma
+from physics_prior.dynamics.arrays import clear, within
 from physics_prior.dynamics.articulated_body import pull
 from physics_prior.dynamics.constraint import complete, gather_rows, respond
 from physics_prior.dynamics.constraint_errors import (
@@ -14,8 +14,8 @@ from physics_prior.dynamics.constraint_errors import (
     velocity_error,
 )
 from physics_prior.dynamics.kernel import kernel
-from physics_prior.dynamics.kinematics import flow_part, pose_part, take_increments
-from physics_prior.dynamics.manifold import displace_part
+from physics_prior.dynamics.kinematics import flow_part, pose, take_increments
+from physics_prior.dynamics.manifold import displace
 from physics_prior.dynamics.records import ALL
 from physics_prior.dynamics.row_system import REFINEMENTS, multiply, multiply_once, row_count, width
 from physics_prior.dynamics.types import Array, Records
@@ -43,14 +43,12 @@ def project(
 
     q moves by -M^-1 A^T (A M^-1 A^T)^-1 e until e is within tolerance, v by the same map of A v (design eq. 11). The factors of a
     configuration nearby, which the workspace must hold, serve q as long as they make e ten times smaller; the velocity has
-    those of the final q, and the next step finds them there. Each pass moves the links that rows move; the others follow in the
-    end. spare: three vectors (nv,).
+    those of the final q, and the next step finds them there. spare: two vectors (nv,).
     """
-    right, w = rows[row_count(rows)], width(rows)
-    z, delta, rest = spare[0], spare[1], spare[4]
-    before, exact, passes = math.inf, False, 0
-    clear(rest)
-    pose_part(links, work, q, 0, w)
+    right = rows[row_count(rows)]
+    z, delta = spare[0], spare[1]
+    before, exact = math.inf, False
+    pose(links, work, q)
     place(work, pairs)
     error = position_error(pairs, right)
     for _ in range(ITERATIONS):
@@ -61,25 +59,19 @@ def project(
         if slow:
             if error <= STALL or (exact and error > 0.5 * before):
                 break
-            follow(links, work, w, passes, rest, delta, q)
             complete(links, work, pairs, rows, known, q)
-            passes = 0
-        before, exact, passes = error, slow, passes + 1
+        before, exact = error, slow
         meet(links, work, pairs, rows, error, target, z, delta)
-        share = 1.0
         if not within(delta, FARTHEST):
             farthest = 0.0
             for k in range(v.shape[0]):
                 farthest = max(farthest, abs(delta[k]))
-            share, passes = FARTHEST / farthest, 2
             for k in range(v.shape[0]):
-                delta[k] *= share
-        accumulate(share, z, rest)
-        displace_part(links, q, delta, 0, w, q)
-        pose_part(links, work, q, 0, w)
+                delta[k] *= FARTHEST / farthest
+        displace(links, q, delta, q)
+        pose(links, work, q)
         place(work, pairs)
         error = position_error(pairs, right)
-    follow(links, work, w, passes, rest, delta, q)
     complete(links, work, pairs, rows, known, q)
     project_velocity(links, work, pairs, rows, v, spare)
     return error
@@ -94,21 +86,46 @@ def meet(
     To first order, and small errors to second. The factors of a place nearby serve as long as they make what is left ten times
     smaller: the links' increments tell that with the poses as they are.
     """
-    right, errors, w = rows[row_count(rows)], rows[row_count(rows) + 2], width(rows)
-    copy(right, errors)
+    m, w = row_count(rows), width(rows)
+    right, last, errors = rows[m], rows[m + 1, m:], rows[m + 2]
+    for r in range(m):
+        errors[r] = right[r]
     clear(z)
-    clear(delta)
     left = error
     for index in range(REFINEMENTS):
         before = left
         multiply_once(rows)
         gather_rows(pairs, rows, w, z)
-        pull(links, work, z, 0, w, delta)
+        pull(links, work, z, w, delta)
         left = error_beyond(work, pairs, errors, right)
+        if index > 0 and left > 0.5 * target:
+            left = extrapolate(pairs, rows, right, last, z)
         if left <= 0.5 * target or left > 0.1 * before:
             break
         if index == 0 and error < CLOSE and error * error > 0.01 * target:
             bend(links, work, pairs, rows)
+        for r in range(m):
+            last[r] = right[r]
+    pull(links, work, z, ALL, delta)
+
+
+@kernel
+def extrapolate(pairs: Records, rows: Array, left: Array, last: Array, z: Array) -> float:
+    """Go the share of the last pass back that leaves least, and return what is left; left and last: after it and before it, (m,).
+
+    What a pass leaves is a linear function of what it found, and mostly along it: the share is nearly that of the next pass.
+    """
+    m, along, square, worst = row_count(rows), 0.0, 0.0, 0.0
+    for r in range(m):
+        gain = last[r] - left[r]
+        along, square = fma(left[r], gain, along), fma(gain, gain, square)
+    share = -along / square if square > 0.0 else 0.0
+    for r in range(m):
+        left[r] = fma(share, last[r] - left[r], left[r])
+        rows[m + 1, r] *= -share
+        worst = max(worst, abs(left[r]))
+    gather_rows(pairs, rows, width(rows), z)
+    return worst
 
 
 @kernel
@@ -126,20 +143,6 @@ def bend(links: Records, work: Records, pairs: Records, rows: Array) -> None:
             for r in range(pairs[p].first, pairs[p].first + pairs[p].rows):
                 right[r] += 0.5 * seen[r]
                 errors[r] += 0.5 * seen[r]
-
-
-@kernel
-def follow(links: Records, work: Records, w: int, passes: int, z: Array, delta: Array, q: Array) -> None:
-    """Move the links that rows do not move as z (nv,), which is then cleared, moves them through the factors, and pose them.
-
-    z is the sum of so many passes: of one, taken whole, the increments of what the links hang on are there.
-    """
-    if w < delta.shape[0]:
-        if passes > 0:
-            pull(links, work, z, w if passes == 1 else 0, ALL, delta)
-            displace_part(links, q, delta, w, ALL, q)
-        pose_part(links, work, q, w, ALL)
-        clear(z)
 
 
 @kernel

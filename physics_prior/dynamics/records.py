@@ -7,18 +7,21 @@ import numpy as np
 from physics_prior import rotations
 from physics_prior.dynamics.kernel import constant_fields
 from physics_prior.effects.effect import PointPair
-from physics_prior.model import JointKind, Tree
+from physics_prior.model import JointKind, Link, Tree
 from physics_prior.model.joint import FREEDOMS
 
 ALL = 1 << 62
 """Beyond every column: the end of a range that leaves no link out."""
+LANES, ENOUGH = 4, 3
+"""Links that sweeps visit side by side: at most, and at least, as their numbers have to be brought there."""
 BOUNDS = 4
 """Numbers at the end of a constraint row: where its columns begin and end, the first row coupled to it, that behind the last."""
 REVOLUTE, PRISMATIC, SPHERICAL, FREE = (int(kind) for kind in JointKind if kind is not JointKind.FIXED)
 
 LINK = np.dtype(
     [
-        ("visit", "i8"),  # of the i-th record: which link sweeps visit i-th outward, siblings one after another
+        ("visit", "i8"),  # of the i-th record: which link sweeps visit i-th outward, those alike one after another
+        ("together", "i8"),  # ... of how many, alike, it is one, which sweeps visit side by side
         (
             "turning",
             "i8",
@@ -42,7 +45,7 @@ LINK = np.dtype(
 )
 """One moving part of the model; constant while a scene runs."""
 
-ABSENT = {"parent": -1, "kind": FREE}
+ABSENT = {"parent": -1, "kind": FREE, "together": 1}
 FREE_LINK = np.dtype(
     {
         "names": [name for name in LINK.names or () if name not in ABSENT],
@@ -62,28 +65,28 @@ WORK = np.dtype(
         ("origin", "f8", 3),  # of the link frame (the joint), world, m
         ("arm", "f8", 3),  # from the parent link's origin to this one, world, m
         ("axis", "f8", 3),  # joint axis, world
-        ("center", "f8", 3),  # from the origin to the centre of mass, world, m
         ("omega", "f8", 3),  # angular velocity, world, rad/s
         ("velocity", "f8", 3),  # of the origin, world, m/s
         ("coriolis_angular", "f8", 3),  # what velocities alone add to the angular acceleration
         ("coriolis_linear", "f8", 3),  # ... and to the acceleration of the origin
-        ("factored", "i8"),  # of the first link: whether factors and rows are those of these poses
-        ("inertia", "f8", 6),  # of the link about its centre of mass, world axes
+        ("bias_moment", "f8", 3),  # articulated bias wrench
+        ("bias_force", "f8", 3),
         ("gyroscopic", "f8", 3),  # torque omega x I omega, or its midpoint form, world
         ("moment", "f8", 3),  # external moment about the origin, world, N m
         ("force", "f8", 3),  # external force, world, N
+        ("factored", "i8"),  # of the first link: whether factors and rows are those of these poses
+        ("inertia", "f8", 6),  # of the link about its centre of mass, world axes
         ("J", "f8", 6),  # articulated inertia about the origin, world axes: moment per angular acceleration
         ("H", "f8", 9),  # ... moment per acceleration of the origin
         ("M", "f8", 6),  # ... force per acceleration of the origin
-        ("bias_moment", "f8", 3),  # articulated bias wrench
-        ("bias_force", "f8", 3),
+        ("center", "f8", 3),  # from the origin to the centre of mass, world, m
         ("U_moment", "f8", 3),  # column of the articulated inertia along the joint axis
         ("U_force", "f8", 3),
         ("D", "f8"),  # its entry along the axis, inverted
+        ("u", "f8", 3),  # joint force left over for acceleration (scalar joints use u[0])
         ("J_inverse", "f8", 6),  # of spherical and free joints
         ("K", "f8", 9),  # J^-1 H
         ("M_inverse", "f8", 6),  # of a free joint: inverse of M - H^T J^-1 H
-        ("u", "f8", 3),  # joint force left over for acceleration (scalar joints use u[0])
         ("alpha", "f8", 3),  # angular acceleration, world, rad/s^2
         ("acceleration", "f8", 3),  # of the origin minus gravity, world, m/s^2
         ("delta_alpha", "f8", 3),  # the same of an increment (constraint forces, projections)
@@ -132,10 +135,9 @@ def link_records(tree: Tree, *touched: np.ndarray) -> np.ndarray:
     for i in sorted(range(len(records)), key=lambda i: i not in moved):
         records[i]["column"] = column
         column += tree.links[i].joint.nv
-    depths: list[int] = []
-    for link in tree.links:
-        depths.append(depths[link.parent] + 1 if link.parent >= 0 else 0)
-    records["visit"] = np.argsort(depths, kind="stable")
+    groups = _alike(tree)
+    records["visit"] = [i for group in groups for i in group]
+    records["together"] = [len(group) for group in groups for _ in group]
     balls = [
         i
         for i, link in enumerate(tree.links)
@@ -148,12 +150,46 @@ def link_records(tree: Tree, *touched: np.ndarray) -> np.ndarray:
         record["q"], record["v"] = link.q.start, link.v.start
         record["axis"], record["position"] = link.joint.axis, link.joint.position
         record["placement"] = rotations.matrix_from_quaternion(link.joint.orientation).ravel()
-        record["turned"] = not np.array_equal(record["placement"], np.eye(3).ravel())
+        record["turned"] = _turned(link)
         record["mass"], record["center"] = link.mass_properties.mass, link.mass_properties.center_of_mass
         record["turning_mass"] = record["mass"] if link.joint.kind is JointKind.SPHERICAL else 0.0
         record["inertia"] = inertia[np.triu_indices(3)]
-        record["principal"] = np.array_equal(inertia, np.diag(np.diag(inertia)))
+        record["principal"] = _principal(link)
     return records
+
+
+def _alike(tree: Tree) -> list[list[int]]:
+    """The links in an outward order, those together that sweeps visit side by side: enough of them for that to pay.
+
+    They are as high above the outermost link, so that none carries another, and the kernels do the same with all. What hangs on
+    the world stands alone.
+    """
+    heights = [0] * len(tree.links)
+    for i in range(len(tree.links) - 1, -1, -1):
+        if (parent := tree.links[i].parent) >= 0:
+            heights[parent] = max(heights[parent], heights[i] + 1)
+    alike: dict[tuple[int, ...], list[int]] = {}
+    for i, link in enumerate(tree.links):
+        key = (-heights[i], int(link.joint.kind), _turned(link), _principal(link), i if link.parent < 0 else -1)
+        alike.setdefault(key, []).append(i)
+    groups: list[list[int]] = []
+    for _, links in sorted(alike.items()):
+        while links:
+            some = LANES if len(links) >= ENOUGH else 1
+            groups.append(links[:some])
+            links = links[some:]
+    return groups
+
+
+def _turned(link: Link) -> bool:
+    """Whether a joint's placement turns at all."""
+    return not np.array_equal(rotations.matrix_from_quaternion(link.joint.orientation), np.eye(3))
+
+
+def _principal(link: Link) -> bool:
+    """Whether a link's axes are its principal ones."""
+    inertia = link.mass_properties.inertia
+    return np.array_equal(inertia, np.diag(np.diag(inertia)))
 
 
 def moved_freedoms(tree: Tree, *touched: np.ndarray) -> int:

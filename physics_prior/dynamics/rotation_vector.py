@@ -4,23 +4,24 @@ Source: Sola 2017, "Quaternion kinematics for the error-state Kalman filter", eq
 """
 
 import math
+from typing import Any
 
 from physics_prior.dynamics.algebra import dots
+from physics_prior.dynamics.blocks import at_most, either, root
 from physics_prior.dynamics.kernel import inline_kernel
 from physics_prior.dynamics.trigonometry import EIGHTH, cosine_of, sine_and_cosine, sine_over
 from physics_prior.dynamics.types import Matrix, Vector
 
 
 @inline_kernel
-def exponential(x: float, y: float, z: float) -> tuple[float, float, float, float]:
-    """The unit quaternion of a rotation vector, safe at zero."""
+def exponential(x: Any, y: Any, z: Any) -> tuple[Any, Any, Any, Any]:
+    """The unit quaternion of a rotation vector, safe at zero; or those of a block of four."""
     quarter = 0.25 * dots(x, y, z, x, y, z)
-    if quarter < EIGHTH:
-        s = 0.5 * sine_over(quarter)
-        return cosine_of(quarter), s * x, s * y, s * z
-    half = math.sqrt(quarter)
-    sine, cosine = sine_and_cosine(half)
-    s = 0.5 * sine / half
+    s, cosine = 0.5 * sine_over(quarter), cosine_of(quarter)
+    if not at_most(quarter, EIGHTH):
+        half = root(quarter)
+        sine, other = sine_and_cosine(half)
+        s, cosine = either(quarter, EIGHTH, s, 0.5 * sine / half), either(quarter, EIGHTH, cosine, other)
     return cosine, s * x, s * y, s * z
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from physics_prior.dynamics.algebra import cross, dot, fma, inverse9, times
-from physics_prior.dynamics.blocks import at_most, get_block, get_lanes, inner, lane, lanes_of, put_block, put_lanes
+from physics_prior.dynamics.algebra import fma
+from physics_prior.dynamics.blocks import at_most, get_block, inner, lane, lanes_of, put_block
 from physics_prior.dynamics.kernel import kernel
 
 COUNT = 8
@@ -37,66 +37,6 @@ def test_what_a_block_leaves_out_is_not_read():
     a = np.full(COUNT, np.nan)
     a[:3] = 1.0
     assert product(a, np.ones(COUNT), 3) == 3.0
-
-
-RECORD = np.dtype([("index", "i8"), ("m", "f8", 9), ("u", "f8", 3), ("out", "f8", 3)], align=True)
-
-
-@kernel
-def solve_each(records):
-    for record in records:
-        m = (
-            record.m[0],
-            record.m[1],
-            record.m[2],
-            record.m[3],
-            record.m[4],
-            record.m[5],
-            record.m[6],
-            record.m[7],
-            record.m[8],
-        )
-        x = answer(m, (record.u[0], record.u[1], record.u[2]))
-        record.out[0], record.out[1], record.out[2] = x
-
-
-@kernel
-def answer(m, u):
-    x = times(inverse9(m), u)
-    y = cross(x, u)
-    return y[0] / 3.0, -y[1] - 0.5, y[2] * dot(x, u) + 2.0
-
-
-@kernel
-def solve_four(records, where):
-    m = (
-        get_lanes(records, "m", 0, where),
-        get_lanes(records, "m", 1, where),
-        get_lanes(records, "m", 2, where),
-        get_lanes(records, "m", 3, where),
-        get_lanes(records, "m", 4, where),
-        get_lanes(records, "m", 5, where),
-        get_lanes(records, "m", 6, where),
-        get_lanes(records, "m", 7, where),
-        get_lanes(records, "m", 8, where),
-    )
-    u = get_lanes(records, "u", 0, where), get_lanes(records, "u", 1, where), get_lanes(records, "u", 2, where)
-    x, y, z = answer(m, u)
-    put_lanes(records, "out", 0, where, x)
-    put_lanes(records, "out", 1, where, y)
-    put_lanes(records, "out", 2, where, z)
-
-
-def test_the_algebra_of_numbers_is_that_of_blocks_to_the_last_bit():
-    records = np.zeros(6, dtype=RECORD)
-    rng = np.random.default_rng(0)
-    records["m"], records["u"] = rng.normal(size=(6, 9)), rng.normal(size=(6, 3))
-    solve_each(records)
-    expected = records["out"].copy()
-    records["out"] = 0.0
-    solve_four(records, (5, 0, 3, 3))
-    np.testing.assert_array_equal(records["out"][[0, 3, 5]], expected[[0, 3, 5]])
-    assert not records["out"][[1, 2, 4]].any()
 
 
 @kernel

@@ -151,7 +151,7 @@ def respond_to(links: Records, work: Records, Z: Array, impulses: Array, m: int,
         if known != 0.0:
             for k in range(Z.shape[1]):
                 z[k] += Z[r, k] * known
-    pull(links, work, z, 0, ALL, change)
+    pull(links, work, z, ALL, change)
 
 
 @kernel

@@ -10,11 +10,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from physics_prior.dynamics.kernel import kernel
+from physics_prior.dynamics.algebra import fma
+from physics_prior.dynamics.arrays import clear
+from physics_prior.dynamics.blocks import get_block, put_block
+from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.types import Array
 
 if TYPE_CHECKING:
     from physics_prior.dynamics.simulator import Simulator
+
+NARROW, WIDE = 8, 32  # numbers that stay in registers while others are added to them
 
 
 @kernel
@@ -24,9 +29,15 @@ def triangularise(T: Array, count: int, scratch: Array) -> None:
     The diagonal ends up positive, or zero. Rows that are zero in a column, below the diagonal down to some place and from
     some place on, are not touched by its reflection. scratch (N + n,).
     """
+    triangularise_from(T, 0, count, scratch)
+
+
+@kernel
+def triangularise_from(T: Array, first: int, count: int, scratch: Array) -> None:
+    """Do so where the first columns are cleared already."""
     N, n = T.shape
     u, w = scratch[:N], scratch[N : N + n]
-    for i in range(min(count, N)):
+    for i in range(first, min(count, N)):
         begin, end = i + 1, N
         while begin < end and T[end - 1, i] == 0.0:
             end -= 1
@@ -100,15 +111,43 @@ def carry_factor(F: Array, G: Array, U: Array, T: Array) -> None:
     for i in range(n):
         for j in range(i):
             F[i, j], F[j, i] = F[j, i], F[i, j]
-    for i in range(n):
-        row = T[i]
-        for j in range(n):
-            row[j] = 0.0
-        add_rows(U[i], F, row)
+    clear(T[:n])
+    add_products(U, 0, F, T)
     for i in range(g):
         row = T[n + i]
         for j in range(n):
             row[j] = G[j, i]
+
+
+@kernel
+def add_products(U: Array, first: int, F: Array, out: Array) -> None:
+    """Add the rows of U (n, .), from the first column on, times F (m, k) to the first k columns of out (., .), row by row."""
+    k = F.shape[1]
+    whole = k - k % WIDE
+    for column in range(0, whole, WIDE):
+        _add_products_to(U, first, F, column, WIDE, WIDE, out)
+    for column in range(whole, k, NARROW):
+        _add_products_to(U, first, F, column, NARROW, min(k - column, NARROW), out)
+
+
+@inline_kernel
+def _add_products_to(U: Array, first: int, F: Array, column: int, count: int, some: int, out: Array) -> None:
+    """Do so for some columns, at most count: those of two rows stay in registers, as long as neither row is zero there."""
+    n, m, k, width = U.shape[0], F.shape[0], F.shape[1], out.shape[1]
+    for i in range(0, n, 2):
+        other = min(i + 1, n - 1)
+        begin, end = 0, m
+        while begin < end and U[i, first + begin] == 0.0 and U[other, first + begin] == 0.0:
+            begin += 1
+        while end > begin and U[i, first + end - 1] == 0.0 and U[other, first + end - 1] == 0.0:
+            end -= 1
+        x = get_block(out, i * width + column, count, some)
+        y = get_block(out, other * width + column, count, some)
+        for j in range(begin, end):
+            row = get_block(F, j * k + column, count, some)
+            x, y = fma(U[i, first + j], row, x), fma(U[other, first + j], row, y)
+        put_block(out, i * width + column, x, some)
+        put_block(out, other * width + column, y, some)
 
 
 def carry(

@@ -8,10 +8,11 @@ seventh number is the time, s. ``linearise`` is the integrator's own, or that of
 import math
 
 from physics_prior.dynamics.arrays import copy, within
-from physics_prior.dynamics.covariance import carry_factor, triangularise
+from physics_prior.dynamics.blocked import triangularise_in_blocks
+from physics_prior.dynamics.covariance import carry_factor
 from physics_prior.dynamics.integrators.rk4 import linearise_smooth, smooth_step
 from physics_prior.dynamics.kernel import kernel
-from physics_prior.dynamics.memory import OPEN, SPARE, tangent_sections
+from physics_prior.dynamics.memory import OPEN, tangent_sections
 from physics_prior.dynamics.motion import sections
 from physics_prior.dynamics.projection import APART
 from physics_prior.dynamics.row_system import row_count
@@ -57,9 +58,9 @@ def carry(
     force_noise (nv, nv): a factor of the density of white generalized forces. T (4 nv, 2 nv) is left as the last step's U F^T
     above G^T; or, if reduced, U as their triangular factor and T as scratch.
     """
-    links, _, _, rows, _, _, spare, _ = sections(memory)
+    links, _, _, rows, _, _, _, _ = sections(memory)
     nv, rank, total = v.shape[0], 0, 0.0
-    n, scratch = 2 * nv, spare[SPARE - 6 : SPARE].reshape(-1)
+    n = 2 * nv
     stages = tangent_sections(tangent, links.shape[0], row_count(rows), nv)[6]
     last = stages.shape[0]
     F, G = stages[last - 4 : last - 2].reshape(n, n), stages[last - 2 : last].reshape(n, n)
@@ -71,7 +72,7 @@ def carry(
             return -3
         carry_factor(F, G, U, T)
         if reduced or index < count - 1:
-            triangularise(T, n, scratch)
+            triangularise_in_blocks(T, n, tangent)  # what derivatives needed is scratch
             copy(T[:n], U)
     if reduced:
         for k in range(n):

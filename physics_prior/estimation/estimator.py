@@ -63,9 +63,9 @@ class Estimator:
     @property
     def counts(self) -> Counts:
         """What became of the measurements so far."""
-        used = sum(node.posterior.used is True for node in self.history.nodes)
-        gated = sum(node.posterior.used is False for node in self.history.nodes)
-        return Counts(self._read, self._dropped.used + used, self._dropped.gated + gated, self._late, self._rejected)
+        outcomes, gone = [node.posterior.used for node in self.history.nodes], self._dropped
+        used, gated = gone.used + outcomes.count(True), gone.gated + outcomes.count(False)
+        return Counts(self._read, used, gated, self._late, self._rejected)
 
     def reset(self) -> None:
         """Settle and forget all measurements; the next ones start it cold."""

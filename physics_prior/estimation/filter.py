@@ -86,7 +86,7 @@ class Filter:
         commands = {command_topic(label): index - len(labels) for index, label in enumerate(labels)}
         self.order = commands | {topic: index for index, topic in enumerate(self.sources)}
         self._limits: dict[int, float] = {}
-        self._here = np.zeros(simulator.nv)
+        self._here = np.zeros(simulator.nv)  # the error at which a prior itself is
 
     def predict(self, posterior: Posterior, stamp: int) -> Posterior:
         """The posterior carried to a later stamp, ns; SimulationError if it leaves the numbers or is too fast to follow."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from physics_prior.dynamics.arrays import accumulate, add_product, clear, copy
 from physics_prior.dynamics.compose import GRAVITY
-from physics_prior.dynamics.covariance import add_rows
+from physics_prior.dynamics.covariance import add_products
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.linear_solve import factorize_square, solve_square
 from physics_prior.dynamics.simulator import Simulator
@@ -79,12 +79,11 @@ def carry_forced(F: Array, response: Array, h: float, forgotten: Array, U: Array
             by_force[i, nv + j] += response[i, j]
         for j in range(m):
             by_force[i, j] *= 0.5 * h
+    add_products(U, 0, F, out[:n])
+    add_products(U, m, by_force, out[:n])
     for i in range(n):
-        row, own = out[i], U[i]
-        add_rows(own[:m], F, row)
-        add_rows(own[m:], by_force, row)
         for j in range(m, n):
-            row[j] = forgotten[j - m] * own[j]
+            out[i, j] = forgotten[j - m] * U[i, j]
 
 
 class ForcedProcess(OnManifold):

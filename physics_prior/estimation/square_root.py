@@ -5,20 +5,18 @@ S is kept in Fortran's order, so that its transpose U, which the kernels reflect
 
 import numpy as np
 
-from physics_prior.dynamics.arrays import add_product
-from physics_prior.dynamics.covariance import triangularise
+from physics_prior.dynamics.blocked import scratch_size, triangularise_in_blocks
+from physics_prior.dynamics.covariance import add_products
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.types import Array
-from physics_prior.estimation.blocked import scratch_size, triangularise_in_blocks
 
-MANY = 64  # errors; a factor of fewer is reduced as soon without blocks
 ROUNDING = 1e-10  # of the largest standard deviation: below it, another is that of a direction that constraints forbid
 
 
 def covariance_of(S: np.ndarray) -> np.ndarray:
     """(k, k) S S^T of rows S (k, n) of a factor, symmetric to the last bit; summed alike on any number of cores."""
     out = np.zeros((len(S), len(S)))
-    add_product(np.ascontiguousarray(S), np.ascontiguousarray(S.T), out)
+    add_products(np.ascontiguousarray(S), 0, np.ascontiguousarray(S.T), out)
     return 0.5 * (out + out.T)
 
 
@@ -30,17 +28,14 @@ def lower_factor(W: np.ndarray) -> np.ndarray:
 def reduced(T: np.ndarray) -> np.ndarray:
     """The lower factor (n, n) of T^T T; T (N >= n, n) in C's order, which is lost."""
     N, n = T.shape
-    if n < MANY:
-        triangularise(T, n, np.empty(N + n))
-    else:
-        triangularise_in_blocks(T, np.empty(scratch_size(N, n)))
+    triangularise_in_blocks(T, n, np.empty(scratch_size(N, n)))
     return T[:n].T
 
 
 def with_first(U: np.ndarray, count: int) -> np.ndarray:
     """A factor (n, n) of the same covariance U^T U, triangular in its first columns: so many rows alone tell of these errors."""
     out = U.copy()
-    triangularise(out, count, np.empty(2 * len(U)))
+    triangularise_in_blocks(out, count, np.empty(scratch_size(*U.shape)))
     return out
 
 

@@ -6,13 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
-from physics_prior.dynamics.covariance import carry_factor, triangularise
-from physics_prior.estimation.gain import MANY as MANY_ROWS
-from physics_prior.estimation.gain import gain_of
+from physics_prior.dynamics.blocked import FEW
+from physics_prior.dynamics.covariance import WIDE, carry_factor, triangularise
+from physics_prior.estimation.gain import MANY, gain_of
 from physics_prior.estimation.observation import Innovation
-from physics_prior.estimation.square_root import MANY, lower_factor, normalised_error, with_first
+from physics_prior.estimation.square_root import lower_factor, normalised_error, with_first
 
 seeds = st.integers(0, 2**32 - 1)
+sizes = st.integers(1, 8) | st.integers(WIDE + 1, WIDE + 10)
 
 
 def _factor(rng, n, decades):
@@ -53,7 +54,7 @@ def test_triangularise_keeps_the_square(seed, n, more):
     assert _relative(L @ L.T - W @ W.T, W @ W.T) < 1e-13  # 1e-15
 
 
-@given(seeds, st.integers(MANY, MANY + 5), st.integers(0, 9), st.integers(0, 9))
+@given(seeds, st.integers(FEW + 4, 3 * FEW), st.integers(0, 9), st.integers(0, 9))
 def test_blocks_of_reflections_make_the_same_factor(seed, n, more, nothing):
     """Of many errors; with rows of zeros at the end and columns without any error."""
     rng = np.random.default_rng(seed)
@@ -73,7 +74,7 @@ def test_triangularise_leaves_zero_rows_alone():
     np.testing.assert_allclose(W @ W.T, [[0.0, 0.0], [0.0, 25.0]], atol=1e-15)
 
 
-@given(seeds, st.integers(1, 8), st.integers(1, 8))
+@given(seeds, sizes, st.integers(1, 8))
 def test_prediction_is_the_dense_one(seed, n, g):
     rng = np.random.default_rng(seed)
     F, G, S = rng.normal(size=(n, n)), rng.normal(size=(n, g)), _factor(rng, n, 0)
@@ -82,7 +83,7 @@ def test_prediction_is_the_dense_one(seed, n, g):
     assert _relative(S @ S.T - expected, expected) < 1e-13  # 1e-15
 
 
-@given(seeds, st.integers(1, 8), st.integers(1, 6) | st.integers(MANY_ROWS, 40), st.integers(0, 3))
+@given(seeds, sizes, st.integers(1, 6) | st.integers(MANY, 40), st.integers(0, 3))
 def test_update_is_the_dense_one(seed, n, m, unseen):
     """By few rows and by a frame of many."""
     rng = np.random.default_rng(seed)
@@ -165,7 +166,7 @@ def test_blocks_are_judged_however_little_is_known(seed):
     assert np.all((squares >= 0.0) & (squares < 1e-6))
 
 
-@pytest.mark.parametrize("m", [2, MANY_ROWS])
+@pytest.mark.parametrize("m", [2, MANY])
 @settings(max_examples=20)
 @given(seeds)
 def test_thousands_of_updates_at_extreme_variances(m, seed):

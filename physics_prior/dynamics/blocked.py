@@ -7,71 +7,65 @@ columns are reduced by themselves first; the others are then moved from memory a
 import math
 
 from physics_prior.dynamics.algebra import fma
-from physics_prior.dynamics.arrays import clear
-from physics_prior.dynamics.covariance import triangularise
+from physics_prior.dynamics.blocks import get_block, put_block
+from physics_prior.dynamics.covariance import triangularise_from
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.types import Array
 
-WIDTH = 4
-FEW = 16  # columns that are left: not worth it
+WIDTH, LANES = 4, 8
+FEW = 24  # columns that are left: not worth it
 
 Four = tuple[float, float, float, float]
 
 
 def scratch_size(N: int, n: int) -> int:
     """Numbers that ``triangularise_in_blocks`` needs for (N, n)."""
-    return WIDTH * (N + n + WIDTH + 1)
+    return WIDTH * (N + WIDTH + 1) + N + n
 
 
 @kernel
-def triangularise_in_blocks(T: Array, scratch: Array) -> None:
-    """Clear T (N, n <= N) below the diagonal as ``triangularise`` does. scratch (``scratch_size``,)."""
+def triangularise_in_blocks(T: Array, count: int, scratch: Array) -> None:
+    """Clear the first ``count`` columns of T (N, n) below the diagonal as ``triangularise`` does. scratch (``scratch_size``,)."""
     N, n = T.shape
-    V, W = scratch[: WIDTH * N].reshape(N, WIDTH), scratch[WIDTH * N : WIDTH * (N + n)].reshape(WIDTH, n)
-    rest = scratch[WIDTH * (N + n) :]
+    V, rest = scratch[: WIDTH * N].reshape(N, WIDTH), scratch[WIDTH * N :]
     dots, scales = rest[: WIDTH * WIDTH].reshape(WIDTH, WIDTH), rest[WIDTH * WIDTH : WIDTH * (WIDTH + 1)]
     i = 0
-    while n - i > FEW:
+    while n - i > FEW and min(count, N) - i >= WIDTH:
         end = N
         while end > i + WIDTH and _is_nothing(T[end - 1], i):
             end -= 1
         _reflect_block(T, i, end, V, dots, scales)
         right = i + WIDTH
-        for c in range(WIDTH):
-            clear(W[c])
-        whole = end - (end - i) % 4
-        for k in range(i, whole, 4):
-            x, y, z, t = T[k, right:], T[k + 1, right:], T[k + 2, right:], T[k + 3, right:]
-            for c in range(WIDTH):
-                w, p, q, r, s = W[c], V[k, c], V[k + 1, c], V[k + 2, c], V[k + 3, c]
-                for j in range(n - right):
-                    w[j] = fma(s, t[j], fma(r, z[j], fma(q, y[j], fma(p, x[j], w[j]))))
-        for k in range(whole, end):
-            x = T[k, right:]
-            for c in range(WIDTH):
-                w, p = W[c], V[k, c]
-                for j in range(n - right):
-                    w[j] = fma(p, x[j], w[j])
-        for c in range(WIDTH):
-            w = W[c]
-            for b in range(c):
-                x, p = W[b], -dots[c, b]
-                for j in range(n - right):
-                    w[j] = fma(p, x[j], w[j])
-            for j in range(n - right):
-                w[j] *= scales[c]
-        a, b, c, d = W[0], W[1], W[2], W[3]
-        for k in range(i, end):
-            x, p, q, r, s = T[k, right:], -V[k, 0], -V[k, 1], -V[k, 2], -V[k, 3]
-            for j in range(n - right):
-                x[j] = fma(s, d[j], fma(r, c[j], fma(q, b[j], fma(p, a[j], x[j]))))
+        whole = n - (n - right) % LANES
+        for column in range(right, whole, LANES):
+            _reflect_columns(T, i, end, V, dots, scales, column, LANES)
+        if whole < n:
+            _reflect_columns(T, i, end, V, dots, scales, whole, n - whole)
         for k in range(i, right):
             own = T[k, k:]
             if own[0] < 0.0:
                 for j in range(n - k):
                     own[j] = -own[j]
         i = right
-    triangularise(T[i:, i:], n - i, scratch[: N + n])
+    triangularise_from(T, i, count, rest)
+
+
+@inline_kernel
+def _reflect_columns(T: Array, i: int, end: int, V: Array, dots: Array, scales: Array, column: int, some: int) -> None:
+    """Reflect some columns of T, at most LANES, from row i on: what they lose of V's columns stays in registers."""
+    n = T.shape[1]
+    a = b = c = d = get_block(T, column, LANES, 0)
+    for k in range(i, end):
+        x = get_block(T, k * n + column, LANES, some)
+        a, b, c, d = fma(V[k, 0], x, a), fma(V[k, 1], x, b), fma(V[k, 2], x, c), fma(V[k, 3], x, d)
+    a = scales[0] * a
+    b = scales[1] * fma(-dots[1, 0], a, b)
+    c = scales[2] * fma(-dots[2, 1], b, fma(-dots[2, 0], a, c))
+    d = scales[3] * fma(-dots[3, 2], c, fma(-dots[3, 1], b, fma(-dots[3, 0], a, d)))
+    for k in range(i, end):
+        x = get_block(T, k * n + column, LANES, some)
+        x = fma(-V[k, 3], d, fma(-V[k, 2], c, fma(-V[k, 1], b, fma(-V[k, 0], a, x))))
+        put_block(T, k * n + column, x, some)
 
 
 @kernel

@@ -15,7 +15,6 @@ from typing import Any
 
 from numba import types
 
-from physics_prior.dynamics.blocked import triangularise_in_blocks
 from physics_prior.dynamics.compose import import_step
 from physics_prior.dynamics.covariance import carry_factor
 from physics_prior.dynamics.kernel_cache import is_kept
@@ -50,7 +49,7 @@ def compile_derivatives(path: Path) -> None:
         step.differentiate: (NUMBERS, NUMBERS, NUMBERS, NUMBERS, types.float64),
         step.spread_noise: (NUMBERS, NUMBERS, MATRIX, types.float64, MATRIX),
         carry_factor: (MATRIX, MATRIX, MATRIX, MATRIX),
-        triangularise_in_blocks: (MATRIX, types.intp, NUMBERS),
+        step.triangularise: (MATRIX, types.intp, NUMBERS),
     }
     for kernel, signature in signatures.items():
         kernel.inner.compile(signature)

@@ -23,6 +23,7 @@ import numba
 import numpy as np
 from numba.core.errors import NumbaError
 
+from physics_prior.dynamics.blocked import FEW
 from physics_prior.dynamics.derivatives import COMPOSITE, FREEDOM
 from physics_prior.dynamics.integrators import INTEGRATORS, IntegratorName
 from physics_prior.dynamics.kernel import inline_kernel
@@ -84,11 +85,13 @@ class Structure(NamedTuple):
         constrained: equality rows.
         touching: inequality rows.
         free: no joints, as all parts are free bodies, which do not touch either.
+        many: so many errors of the state that reflections in blocks are sooner; others do without what that takes to compile.
     """
 
     constrained: bool = False
     touching: bool = False
     free: bool = False
+    many: bool = False
 
 
 def structure_of(tree: Tree, effects: Sequence[Effect]) -> Structure:
@@ -97,7 +100,7 @@ def structure_of(tree: Tree, effects: Sequence[Effect]) -> Structure:
     limited = any(math.isfinite(each.lower) or math.isfinite(each.upper) for each in ranges)
     touching = limited or any(effect.touching_pairs(tree) for effect in effects)
     free = not touching and all(link.joint.kind is JointKind.FREE for link in tree.links)
-    return Structure(any(effect.point_pairs(tree) for effect in effects), touching, free)
+    return Structure(any(effect.point_pairs(tree) for effect in effects), touching, free, 2 * tree.nv > FEW)
 
 
 def step_source(
@@ -138,6 +141,9 @@ def step_source(
     if structure.free:
         line = "from physics_prior.dynamics.memory import free_sections as sections"
         texts["motion"] = _replace(texts["motion"], "links", line)
+    if structure.many:
+        line = "from physics_prior.dynamics.blocked import triangularise_in_blocks as triangularise"
+        texts["step"] = _replace(texts["step"], "errors", line)
     if structure.touching:
         step = "sleeping_step" if sleeping else "event_step"
         texts["step"] = _replace(texts["step"], "events", f"move, linearise = {step}, linearise_events")

@@ -8,8 +8,8 @@ seventh number is the time, s. ``linearise`` is the integrator's own, or that of
 import math
 
 from physics_prior.dynamics.arrays import copy, within
-from physics_prior.dynamics.blocked import triangularise_in_blocks
 from physics_prior.dynamics.covariance import carry_factor
+from physics_prior.dynamics.covariance import triangularise as triangularise  # scene: errors
 from physics_prior.dynamics.integrators.rk4 import linearise_smooth, smooth_step
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.memory import OPEN, tangent_sections
@@ -72,7 +72,7 @@ def carry(
             return -3
         carry_factor(F, G, U, T)
         if reduced or index < count - 1:
-            triangularise_in_blocks(T, n, tangent)  # what derivatives needed is scratch
+            triangularise(T, n, tangent)  # what derivatives needed is scratch
             copy(T[:n], U)
     if reduced:
         for k in range(n):

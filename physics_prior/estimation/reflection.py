@@ -162,7 +162,7 @@ def reflect_onto(R: Array, B: Array, share: Array, leads: Array, scales: Array) 
                 put_block(B, at, fma(-B[k, i], taken, get_block(B, at, NARROW, NARROW)), NARROW)
 
 
-@inline_kernel
+@kernel
 def _products_with(B: Array, i: int, out: Array) -> None:
     """Fill out (m,), from the block of i on, with the inner products of a column of B (n, m) with all."""
     n, width = B.shape

@@ -5,8 +5,8 @@ S is kept in Fortran's order, so that its transpose U, which the kernels reflect
 
 import numpy as np
 
-from physics_prior.dynamics.blocked import scratch_size, triangularise_in_blocks
-from physics_prior.dynamics.covariance import add_products
+from physics_prior.dynamics.blocked import FEW, scratch_size, triangularise_in_blocks
+from physics_prior.dynamics.covariance import add_products, triangularise
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.types import Array
 
@@ -27,16 +27,22 @@ def lower_factor(W: np.ndarray) -> np.ndarray:
 
 def reduced(T: np.ndarray) -> np.ndarray:
     """The lower factor (n, n) of T^T T; T (N >= n, n) in C's order, which is lost."""
-    N, n = T.shape
-    triangularise_in_blocks(T, n, np.empty(scratch_size(N, n)))
+    n = T.shape[1]
+    _triangularise(T, n)
     return T[:n].T
 
 
 def with_first(U: np.ndarray, count: int) -> np.ndarray:
     """A factor (n, n) of the same covariance U^T U, triangular in its first columns: so many rows alone tell of these errors."""
     out = U.copy()
-    triangularise_in_blocks(out, count, np.empty(scratch_size(*U.shape)))
+    _triangularise(out, count)
     return out
+
+
+def _triangularise(T: np.ndarray, count: int) -> None:
+    """Clear the first columns below the diagonal; a scene of few errors need not have the blocks compiled for that."""
+    clear_columns = triangularise_in_blocks if T.shape[1] > FEW else triangularise
+    clear_columns(T, count, np.empty(scratch_size(*T.shape)))
 
 
 @kernel

@@ -10,7 +10,7 @@ import pytest
 from numba.core import event
 from numba.core.errors import TypingError
 
-from physics_prior.dynamics.compose import GRAVITY, Structure, pack_parameters, step_module, step_source
+from physics_prior.dynamics.compose import GRAVITY, Structure, pack_parameters, step_module, step_source, structure_of
 from physics_prior.dynamics.integrators import INTEGRATORS
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kernel_cache import cache_directory
@@ -18,6 +18,7 @@ from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects.attachment import Attachment
 from physics_prior.effects.gravity import Gravity
 from physics_prior.effects.joint_damping import JointDamping
+from physics_prior.studies.bench_models import humanlike
 
 EFFECT = """
 from typing import ClassVar
@@ -71,6 +72,12 @@ def test_step_of_no_force_is_the_template(double_pendulum):
     held = step_source([Gravity(), Attachment(part="lower")], Structure(constrained=True), "rk4")
     changed = [(a, b) for a, b in zip(plain.splitlines(), held.splitlines(), strict=True) if a != b]
     assert changed == [("CONSTRAINED = False", "CONSTRAINED = True")]
+
+
+def test_a_step_of_few_errors_is_without_blocks_of_reflections(double_pendulum):
+    few, many = (step_source([], structure_of(tree, []), "rk4") for tree in (double_pendulum, humanlike()))
+    assert "blocks" not in few
+    assert "import triangularise_in_blocks as triangularise" in many
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)

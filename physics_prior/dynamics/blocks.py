@@ -58,11 +58,8 @@ def lanes_of(_typing_context: Any, a: Any, b: Any, c: Any) -> Any:
     """A block of four numbers, the last zero."""
     block = BlockType(4)
 
-    def build(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        vector = context.get_value_type(block)(None)
-        for lane, each in enumerate(arguments):
-            vector = builder.insert_element(vector, each, LANE(lane))
-        return vector
+    def build(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        return _filled(builder, block, arguments)
 
     return block(types.float64, types.float64, types.float64), build
 
@@ -71,15 +68,18 @@ def lanes_of(_typing_context: Any, a: Any, b: Any, c: Any) -> Any:
 def beside(_typing_context: Any, like: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
     """A block of four numbers, if that is what it is to be like; if a number, the first."""
 
-    def build(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        if not isinstance(like, BlockType):
-            return arguments[1]
-        vector = context.get_value_type(like)(None)
-        for lane, each in enumerate(arguments[1:]):
-            vector = builder.insert_element(vector, each, LANE(lane))
-        return vector
+    def build(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        return _filled(builder, like, arguments[1:]) if isinstance(like, BlockType) else arguments[1]
 
     return like(like, *[types.float64] * 4), build
+
+
+def _filled(builder: Any, block: BlockType, numbers: Any) -> Any:
+    """A block that begins with some numbers, zeros behind them."""
+    vector = ir.VectorType(DOUBLE, block.count)(None)
+    for lane, each in enumerate(numbers):
+        vector = builder.insert_element(vector, each, LANE(lane))
+    return vector
 
 
 @intrinsic(prefer_literal=True)

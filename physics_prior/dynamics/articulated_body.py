@@ -307,12 +307,16 @@ def _release(links: Records, work: Records, where: Any, kind: int, alpha: Any, a
         u = numbers(work, "u", 1, where)
         rate = column[6] * (u - dot(column[0:3], alpha) - dot(column[3:6], acceleration))
         put_elements(vdot, n, rate)
-        moved = scale(rate, axis)
-        if kind == REVOLUTE:
-            alpha = plus(alpha, moved)
-        else:
-            acceleration = plus(acceleration, moved)
-        put_numbers(work, "alpha", where, alpha + acceleration)
+        put_numbers(work, "alpha", where, _moved_along(kind, axis, rate, alpha, acceleration))
+
+
+@inline_kernel
+def _moved_along(kind: int, axis: Any, rate: Any, alpha: Any, acceleration: Any) -> Any:
+    """Accelerations, the angular and that of the origin, with that of a joint along or about its axis."""
+    own = scale(rate, axis)
+    if kind == REVOLUTE:
+        return plus(alpha, own) + acceleration
+    return alpha + plus(acceleration, own)
 
 
 @kernel
@@ -377,9 +381,4 @@ def _pull(
         column, axis = numbers(work, "U_moment", 7, where), numbers(work, "axis", 3, where)
         rate = elements(z, 1, k) - column[6] * (dot(column[0:3], alpha) + dot(column[3:6], acceleration))
         put_elements(vdot, n, rate)
-        moved = scale(rate, axis)
-        if kind == REVOLUTE:
-            alpha = plus(alpha, moved)
-        else:
-            acceleration = plus(acceleration, moved)
-        put_numbers(work, "delta_alpha", where, alpha + acceleration)
+        put_numbers(work, "delta_alpha", where, _moved_along(kind, axis, rate, alpha, acceleration))

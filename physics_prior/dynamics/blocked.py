@@ -7,12 +7,12 @@ columns are reduced by themselves first; the others are then moved from memory a
 import math
 
 from physics_prior.dynamics.algebra import fma
-from physics_prior.dynamics.blocks import get_block, put_block
+from physics_prior.dynamics.blocks import NARROW, get_block, put_block
 from physics_prior.dynamics.covariance import triangularise_from
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.types import Array
 
-WIDTH, LANES = 4, 8
+WIDTH = 4
 FEW = 24  # columns that are left: not worth it
 
 Four = tuple[float, float, float, float]
@@ -36,9 +36,9 @@ def triangularise_in_blocks(T: Array, count: int, scratch: Array) -> None:
             end -= 1
         _reflect_block(T, i, end, V, dots, scales)
         right = i + WIDTH
-        whole = n - (n - right) % LANES
-        for column in range(right, whole, LANES):
-            _reflect_columns(T, i, end, V, dots, scales, column, LANES)
+        whole = n - (n - right) % NARROW
+        for column in range(right, whole, NARROW):
+            _reflect_columns(T, i, end, V, dots, scales, column, NARROW)
         if whole < n:
             _reflect_columns(T, i, end, V, dots, scales, whole, n - whole)
         for k in range(i, right):
@@ -52,18 +52,18 @@ def triangularise_in_blocks(T: Array, count: int, scratch: Array) -> None:
 
 @inline_kernel
 def _reflect_columns(T: Array, i: int, end: int, V: Array, dots: Array, scales: Array, column: int, some: int) -> None:
-    """Reflect some columns of T, at most LANES, from row i on: what they lose of V's columns stays in registers."""
+    """Reflect some columns of T, at most NARROW, from row i on: what they lose of V's columns stays in registers."""
     n = T.shape[1]
-    a = b = c = d = get_block(T, column, LANES, 0)
+    a = b = c = d = get_block(T, column, NARROW, 0)
     for k in range(i, end):
-        x = get_block(T, k * n + column, LANES, some)
+        x = get_block(T, k * n + column, NARROW, some)
         a, b, c, d = fma(V[k, 0], x, a), fma(V[k, 1], x, b), fma(V[k, 2], x, c), fma(V[k, 3], x, d)
     a = scales[0] * a
     b = scales[1] * fma(-dots[1, 0], a, b)
     c = scales[2] * fma(-dots[2, 1], b, fma(-dots[2, 0], a, c))
     d = scales[3] * fma(-dots[3, 2], c, fma(-dots[3, 1], b, fma(-dots[3, 0], a, d)))
     for k in range(i, end):
-        x = get_block(T, k * n + column, LANES, some)
+        x = get_block(T, k * n + column, NARROW, some)
         x = fma(-V[k, 3], d, fma(-V[k, 2], c, fma(-V[k, 1], b, fma(-V[k, 0], a, x))))
         put_block(T, k * n + column, x, some)
 

@@ -14,6 +14,7 @@ from numba.extending import intrinsic, lower_builtin, models, register_model
 
 DOUBLE, LANE = ir.DoubleType(), ir.IntType(32)
 REGISTER = 4  # numbers that a sum of products takes at once
+NARROW, WIDE = 8, 32  # columns that loops over others leave in registers, and more of them where there are as many
 
 
 class BlockType(types.Type):  # type: ignore[misc]

@@ -12,14 +12,12 @@ import numpy as np
 
 from physics_prior.dynamics.algebra import fma
 from physics_prior.dynamics.arrays import clear
-from physics_prior.dynamics.blocks import get_block, put_block
+from physics_prior.dynamics.blocks import NARROW, WIDE, get_block, put_block
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.types import Array
 
 if TYPE_CHECKING:
     from physics_prior.dynamics.simulator import Simulator
-
-NARROW, WIDE = 8, 32  # numbers that stay in registers while others are added to them
 
 
 @kernel

@@ -19,13 +19,11 @@ from physics_prior.dynamics.algebra import (
     scale,
     transposed,
 )
-from physics_prior.dynamics.blocks import get_block, put_block
+from physics_prior.dynamics.blocks import NARROW, WIDE, get_block, put_block
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.records import FREE, PRISMATIC, REVOLUTE
 from physics_prior.dynamics.spatial import add, put_spatial
 from physics_prior.dynamics.types import Array, Matrix, Records, Spatial, Symmetric, Vector
-
-WIDE, NARROW = 32, 8  # columns solved for at a time, and what of them is left
 
 
 @kernel

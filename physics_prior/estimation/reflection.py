@@ -16,8 +16,8 @@ from typing import Any
 
 from physics_prior.dynamics.algebra import fma
 from physics_prior.dynamics.arrays import clear, copy
-from physics_prior.dynamics.blocks import get_block, put_block
-from physics_prior.dynamics.covariance import NARROW, WIDE, add_rows
+from physics_prior.dynamics.blocks import NARROW, WIDE, get_block, put_block
+from physics_prior.dynamics.covariance import add_rows
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.memory import FLOAT, array_at
 from physics_prior.dynamics.types import Array

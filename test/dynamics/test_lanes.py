@@ -10,7 +10,7 @@ from physics_prior.dynamics import articulated_body, kinematics, manifold
 from physics_prior.dynamics.algebra import cross, dot, inverse9, times
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.lanes import add_numbers, elements, numbers, put_elements, put_numbers
-from physics_prior.dynamics.records import LANES, WORK, link_records
+from physics_prior.dynamics.records import ALL, LANES, WORK, link_records
 from physics_prior.dynamics.rotation_vector import exponential
 from physics_prior.dynamics.trigonometry import FARTHEST, sine_and_cosine
 from physics_prior.model import Joint, JointKind, Part, Tree
@@ -147,7 +147,7 @@ def test_sweeps_tell_of_links_side_by_side_what_they_tell_one_by_one(tree):
         kinematics.move(links, work, q, v)
         articulated_body.factorize(links, work)
         articulated_body.accelerate(links, work, tau, np.array([0.0, 0.0, -9.81]), vdot)
-        articulated_body.pull(links, work, tau, 1 << 62, pulled)
+        articulated_body.pull(links, work, tau, ALL, pulled)
         results.append((q, vdot, pulled, work))
     for one, other in zip(*results, strict=True):
         assert one.tobytes() == other.tobytes()

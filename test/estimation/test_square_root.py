@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from physics_prior.dynamics.blocked import FEW
-from physics_prior.dynamics.covariance import WIDE, carry_factor, triangularise
+from physics_prior.dynamics.blocks import WIDE
+from physics_prior.dynamics.covariance import carry_factor, triangularise
 from physics_prior.estimation.gain import MANY, gain_of
 from physics_prior.estimation.observation import Innovation
 from physics_prior.estimation.square_root import lower_factor, normalised_error, with_first

@@ -10,29 +10,27 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from numba import types
 
 from physics_prior.dynamics.compose import import_step
 from physics_prior.dynamics.covariance import carry_factor
+from physics_prior.dynamics.entry import MATRIX, NUMBERS, Step
 from physics_prior.dynamics.kernel_cache import is_kept
-
-NUMBERS, MATRIX = types.float64[::1], types.float64[:, ::1]
 
 
 @contextmanager
-def derivatives_beside(step: ModuleType) -> Iterator[None]:
+def derivatives_beside(step: Step) -> Iterator[None]:
     """Have another process compile a step's derivatives while the block compiles the rest; it ends with the block.
 
     Not so where there is but one core, or where ``carry`` is in the cache already. If it fails, the block compiles them itself.
     """
-    if (os.cpu_count() or 1) < 2 or is_kept(step.carry):
+    if (os.cpu_count() or 1) < 2 or is_kept(step.module.carry):
         yield
         return
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    command = [sys.executable, "-m", __name__, str(step.__file__)]
+    command = [sys.executable, "-m", __name__, str(step.module.__file__)]
     quiet = subprocess.DEVNULL
     process = subprocess.Popen(command, env=environment, stdin=quiet, stdout=quiet, stderr=quiet)
     try:

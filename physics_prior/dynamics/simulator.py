@@ -14,6 +14,7 @@ from physics_prior.dynamics.contact.memory import Sleep, candidates_in, contact_
 from physics_prior.dynamics.contact.reactions import candidates_by_name, reaction
 from physics_prior.dynamics.contact.records import candidate_records
 from physics_prior.dynamics.covariance import carry_step
+from physics_prior.dynamics.entry import Step, require_state
 from physics_prior.dynamics.failure import failure, require_finite
 from physics_prior.dynamics.inertia_check import check_inertia
 from physics_prior.dynamics.integrators import DEFAULT, INTEGRATORS, TOLERATED, IntegratorName
@@ -45,7 +46,7 @@ class Simulator:
         unknown: the unknown forces and the values that they have now (unknown_forces.py).
         switches: which of the effects act now, and what happens when they take hold (switches.py).
         interval: s, over which impulses of contact are told as forces: the step size.
-        step, memory: the compiled step (compose.py) and the array it works in (memory.py).
+        step, memory: the compiled step (entry.py) and the array it works in (memory.py).
         rank: rank of the constraint rows at the last evaluation (below ``rows`` where some are redundant: then the motion is
             unique, the split of forces is not).
 
@@ -114,11 +115,10 @@ class Simulator:
         self._links, self._work, self._pairs = memory.links, memory.work, memory.pairs
         self.candidates = candidates_in(memory.contact_part)
         self._gravity = memory.parameters[:GRAVITY]
-        self.step = step_module(effects, structure, integrator, sleep is not None)
+        self.step = Step(step_module(effects, structure, integrator, sleep is not None))
         self._rotations, self._origins = self._work["rotation"].reshape(-1, 3, 3), self._work["origin"]
         self._frames: dict[Any, tuple[int, np.ndarray, np.ndarray]] = {}
-        self._still, self._vdot = np.zeros(self.nv), np.zeros(self.nv)
-        self._tangent = np.zeros(0)
+        self._vdot, self._tangent = np.zeros(self.nv), np.zeros(0)
         self._stores = any(effect.compiled is not None and effect.compiled.energy is not None for effect in effects)
         self._posed = np.zeros(self.nq)
         self.switches = Switches(self, {label: (first, last) for label, first, last in labels})
@@ -131,14 +131,14 @@ class Simulator:
             SimulationError: not finite, where a posture leaves a joint no inertia (a straight chain of thin rods).
         """
         vdot = np.zeros(self.nv)
-        self._evaluate(q, v, self._still if tau is None else tau, vdot)
+        self._evaluate(q, v, tau, vdot)
         return vdot
 
     def acceleration_derivatives(
         self, q: np.ndarray, v: np.ndarray, tau: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives (nv, nv) of ``acceleration`` by the tangent of q and by v, at constant tau; not of what touches."""
-        extra, nv = self._still if tau is None else tau, self.nv
+        extra, nv = require_state(self, q, v, tau), self.nv
         self.rank = self.step.differentiate_acceleration(self.memory.array, self.tangent_array(), q, v, extra)
         by_state = self.tangent_array()[: 2 * nv * nv].reshape(nv, 2 * nv)
         return by_state[:, :nv].copy(), by_state[:, nv:].copy()
@@ -150,7 +150,7 @@ class Simulator:
             SimulationError: the motion left the numbers or came apart, or an integrator found no solution (a step far too
                 large for it).
         """
-        extra = self._still if tau is None else tau
+        extra = require_state(self, q, v, tau)
         self.moved(self.step.advance(self.memory.array, q, v, extra, h, count), h)
 
     def linearise(
@@ -165,6 +165,7 @@ class Simulator:
         Raises:
             SimulationError: as of ``advance``.
         """
+        require_state(self, q, v, None)
         noise = np.diag(force_noise) if force_noise.ndim == 1 else force_noise
         W = carry_step(self, q, v, h, np.eye(2 * self.nv), noise)
         return W[:, : 2 * self.nv], W[:, 2 * self.nv :]
@@ -260,7 +261,7 @@ class Simulator:
     def mass_matrix(self, q: np.ndarray) -> np.ndarray:
         """(nv, nv) generalized inertia at q."""
         M = np.zeros((self.nv, self.nv))
-        self.move(q, self._still)
+        self.move(q, np.zeros(self.nv))
         newton_euler.mass_matrix(self._links, self._work, M)
         return M
 
@@ -309,9 +310,9 @@ class Simulator:
             SimulationError: as ``acceleration``.
         """
         out = np.zeros((len(self.wrench_names), 6))
-        self._posed[:] = q
         if vdot is None:
-            self._evaluate(q, v, self._still, self._vdot)
+            self._evaluate(q, v, None, self._vdot)
+            self._posed[:] = q
             if not self.held:
                 return out
             tell_wrenches(self._links, self._work, self._pairs, self.firsts, out)
@@ -320,6 +321,7 @@ class Simulator:
                 out[row, :3], out[row, 3:] = push.force, push.moment
             out[len(out) - len(self.unknown.feet) :] = self.unknown.wrench_rows()
         else:
+            self._posed[:] = q
             self.candidates[["force", "moment", "point"]] = 0.0
             kinematics.move(self._links, self._work, q, v)
             newton_euler.spread(self._links, self._work, vdot, self._gravity)
@@ -382,8 +384,8 @@ class Simulator:
         """Bring moving anchors to the present time."""
         anchor_motion.move_anchors(self._work, self._pairs, self.memory.parameters, self.memory.array[TIME])
 
-    def _evaluate(self, q: np.ndarray, v: np.ndarray, extra: np.ndarray, vdot: np.ndarray) -> None:
-        array, h = self.memory.array, self.interval
+    def _evaluate(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray | None, vdot: np.ndarray) -> None:
+        array, h, extra = self.memory.array, self.interval, require_state(self, q, v, tau)
         self.rank = self.step.evaluate(array, q, v, extra, 0.0, vdot)
         if self.touching:
             # contact forces are the impulses of a step to come, over its time; anchors stand where it ends

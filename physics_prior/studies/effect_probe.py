@@ -50,7 +50,7 @@ def answer(scene: Scene) -> dict[str, Any]:
         simulator = scene.simulator()
         simulator.begin(q, v)
         simulator.advance(q, v, scene.step.size, STEPS)
-    (assembly,) = simulator.step.advance.inspect_asm().values()
+    (assembly,) = simulator.step.module.advance.inspect_asm().values()
     code = instructions(assembly)
     text = step_source(scene.effects, structure_of(scene.tree, scene.effects), scene.step.integrator)
     return {

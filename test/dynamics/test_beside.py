@@ -26,7 +26,7 @@ top = MassProperties(1.0, np.zeros(3), np.diag([1.0, 2.0, 3.0]))
 tree = Tree([Part("top", top)], [Joint("flight", JointKind.FREE, "world", "top")])
 simulator = Simulator(tree, [Gravity()])
 if "path" in sys.argv:
-    print(simulator.step.__file__)
+    print(simulator.step.module.__file__)
 else:
     compiled = Compiled()
     compiled.on_start = lambda event: compiled.modules.append(event.data["dispatcher"].py_func.__name__)

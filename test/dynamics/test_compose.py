@@ -121,7 +121,7 @@ def test_step_without_an_effect_is_bit_identical_to_one_where_it_does_nothing(do
 
 
 def test_step_module_is_shared_by_scenes_of_the_same_effects(double_pendulum, heavy_top):
-    modules = {Simulator(tree, [Gravity()]).step for tree in (double_pendulum, heavy_top)}
+    modules = {Simulator(tree, [Gravity()]).step.module for tree in (double_pendulum, heavy_top)}
     assert len(modules) == 1
     assert len({step_module([], Structure(), integrator) for integrator in INTEGRATORS}) == len(INTEGRATORS)
 

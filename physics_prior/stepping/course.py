@@ -31,8 +31,8 @@ class Course:
     Attributes:
         tree, effects: as ``Simulator`` takes them.
         q, v, tau: (nq,) and (nv,), where it starts; (nv,) constant generalized forces, N and N m, None for none.
-        times: (k,) s, rising, at which it is looked at; steps end there.
-        longest: s, the longest step that is tried.
+        times: (k,) s, multiples of the first, at which it is looked at; steps end there.
+        parts: of the time from look to look: as many steps as the longest that are tried make of it.
         observe: what is seen of a state, (n,); distance: of two such sights.
     """
 
@@ -41,10 +41,20 @@ class Course:
     q: np.ndarray
     v: np.ndarray
     times: np.ndarray
-    longest: float
+    parts: int
     observe: Observe
     distance: Distance
     tau: np.ndarray | None = None
+
+    @property
+    def interval(self) -> float:
+        """The time from look to look, s."""
+        return float(self.times[0])
+
+    @property
+    def longest(self) -> float:
+        """The longest step that is tried, s."""
+        return self.interval / self.parts
 
 
 def course_of(scene: Scene) -> Course:
@@ -61,7 +71,7 @@ def course_of(scene: Scene) -> Course:
         return np.concatenate([x + own @ R.T for (x, R), own in zip(poses, marks, strict=True)])
 
     times = interval * np.arange(1, count + 1)
-    return Course(tree, scene.effects, scene.initial.q, scene.initial.v, times, interval, observe, furthest)
+    return Course(tree, scene.effects, scene.initial.q, scene.initial.v, times, 1, observe, furthest)
 
 
 def furthest(a: np.ndarray, b: np.ndarray) -> float:

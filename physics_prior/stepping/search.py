@@ -10,13 +10,15 @@ HOPELESS = 10.0  # times the finest: where the order says so much is needed, not
 AIM = 0.8  # of the error that will do: a try a little beyond it is a try wasted
 
 
-def coarsest(error: Callable[[int], float], order: int, allowed: float, most: Callable[[], int]) -> int | None:
-    """The smallest n, up to some, whose error is allowed; None where there is none.
+def coarsest(
+    error: Callable[[int], float], order: int, allowed: float, most: Callable[[], int], least: int = 1
+) -> int | None:
+    """The smallest n, from the least up to some, whose error is allowed; None where there is none.
 
     error: falls with the order-th power of n, about; infinite where the motion is lost. Nothing above most() is tried, which may
     learn from what was.
     """
-    failed, n = 0, 1
+    failed, n = 0, least
     while not (found := error(n)) <= allowed:
         growth, limit = LOST, most()
         if n >= limit:

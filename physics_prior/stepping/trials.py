@@ -30,7 +30,7 @@ Report = Callable[[str], None]
 class Scheme:
     """An integrator at steps of its own size, or at equal ones.
 
-    Its settings, from 1 on, go from coarse to fine.
+    Its settings, numbers, go from coarse to fine.
     """
 
     integrator: IntegratorName
@@ -40,14 +40,14 @@ class Scheme:
     def name(self) -> str:
         return f"{self.integrator}, its own steps" if self.own_steps else self.integrator
 
-    def step(self, longest: float, n: int) -> Step:
-        """A setting: n equal steps in the longest, or, of its own, tolerances of which four are a decade."""
+    def step(self, interval: float, n: int, parts: int = 1) -> Step:
+        """A setting: n equal steps in an interval of s; or, of its own in parts of it, tolerances of which four are a decade."""
         if self.own_steps:
             tolerance = float(f"{LOOSE * 10.0 ** ((1 - n) / 4):.4g}")
-            return Step(integrator=self.integrator, size=longest, tolerance=tolerance)
+            return Step(integrator=self.integrator, size=interval / parts, tolerance=tolerance)
         if INTEGRATORS[self.integrator].adaptive:
-            return Step(integrator=self.integrator, size=longest / n, tolerance=LOOSE)
-        return Step(integrator=self.integrator, size=longest / n)
+            return Step(integrator=self.integrator, size=interval / n, tolerance=LOOSE)
+        return Step(integrator=self.integrator, size=interval / n)
 
 
 RIGHT = ((2, 1e-13), (4, 1e-11), (8, 1e-9), (16, LOOSE))
@@ -95,7 +95,7 @@ class Trials:
 
     def error(self, scheme: Scheme, n: int) -> float:
         """The largest distance of a scheme's n-th setting from the right motion, m; infinite where the motion is lost."""
-        step = scheme.step(self._course.longest, n)
+        step = self._step(scheme, n)
         if step not in self._errors:
             follower = Follower(self._course, step)
             try:
@@ -110,7 +110,7 @@ class Trials:
     def contestants(self) -> list[Scheme]:
         """Who is worth trying: those for stiff motion only where the longest step of Runge and Kutta's loses it."""
         self._report(f"trying {EXPLICIT[0].name}")
-        stiff = not np.isfinite(self.error(EXPLICIT[0], 1))
+        stiff = not np.isfinite(self.error(EXPLICIT[0], self._course.parts))
         return [*EXPLICIT, *(IMPLICIT if stiff else ())]
 
     def reach(self, scheme: Scheme, allowed: float, most: int | None = None) -> int | None:
@@ -120,12 +120,12 @@ class Trials:
             # what chooses its own steps scatters: the next tolerance has to do, too
             n = first(lambda i: max(self.error(scheme, i + 1), self.error(scheme, i + 2)), allowed, OWN_SETTINGS - 1)
             return None if n is None else n + 1
-        length = self._course.times[-1] / self._course.longest
+        intervals, least = self._course.times[-1] / self._course.interval, self._course.parts
 
         def patience() -> int:
-            return max(1, int(PATIENCE / (length * self._cost[scheme]))) if most is None else most
+            return max(least, int(PATIENCE / (intervals * self._cost[scheme]))) if most is None else most
 
-        return coarsest(partial(self.error, scheme), INTEGRATORS[scheme.integrator].order, allowed, patience)
+        return coarsest(partial(self.error, scheme), INTEGRATORS[scheme.integrator].order, allowed, patience, least)
 
     def best(self, allowed: float) -> list[Measured]:
         """Of each scheme, the coarsest step whose error is allowed, with its cost per longest step, in turns."""
@@ -133,11 +133,14 @@ class Trials:
         for scheme in self.contestants():
             n = self.reach(scheme, allowed)
             if n is not None:  # the longest step may be that of its own steps, too
-                found.setdefault(scheme.step(self._course.longest, n), (scheme, n))
+                found.setdefault(self._step(scheme, n), (scheme, n))
         return [
             Measured(scheme=scheme.name, step=step, error=self.error(scheme, n), us=us)
             for (step, (scheme, n)), us in zip(found.items(), self.costs(list(found)), strict=True)
         ]
+
+    def _step(self, scheme: Scheme, n: int) -> Step:
+        return scheme.step(self._course.interval, n, self._course.parts)
 
     def costs(self, steps: Sequence[Step]) -> list[float]:
         """Microseconds of the processor that steps take for the longest one's time, medians of runs in turns."""

@@ -29,6 +29,19 @@ def test_a_coarse_one_that_will_do_is_taken_at_once():
     assert coarsest(lambda n: 1e-9, 4, 1e-6, lambda: 100) == 1
 
 
+@pytest.mark.parametrize(("allowed", "found"), [(1.0, 10), (0.99, 11), (0.7, 11), (0.6, 12), (0.1, 18)])
+def test_where_coarse_ones_are_many_parts_the_search_is_as_fine(allowed, found):
+    """Ten parts at least, and of the order four: a third less error is one part more."""
+    tries = []
+
+    def error(n):
+        tries.append(n)
+        return (10.0 / n) ** 4
+
+    assert coarsest(error, 4, allowed, lambda: 100, 10) == found
+    assert min(tries) == 10
+
+
 @pytest.mark.parametrize("most", [1, 7, 999])
 def test_nothing_is_tried_beyond_the_most(most):
     tries = []

@@ -115,7 +115,8 @@ def course_of(problem: Problem, benchmark: Benchmark) -> Course:
     def observe(simulator: Simulator, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         return benchmark.observe(Run(simulator, q, v))
 
-    start = benchmark.q, benchmark.v, benchmark.times, problem.steps[0], observe, benchmark.distance
+    parts = round(float(benchmark.times[0]) / problem.steps[0])
+    start = benchmark.q, benchmark.v, benchmark.times, parts, observe, benchmark.distance
     return Course(benchmark.tree, benchmark.effects, *start, benchmark.tau)
 
 

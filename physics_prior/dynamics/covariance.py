@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from physics_prior.dynamics.algebra import fma
 from physics_prior.dynamics.arrays import clear
-from physics_prior.dynamics.blocks import NARROW, WIDE, get_block, put_block
-from physics_prior.dynamics.kernel import inline_kernel, kernel
+from physics_prior.dynamics.kernel import kernel
+from physics_prior.dynamics.products import add_product
 from physics_prior.dynamics.types import Array
 
 if TYPE_CHECKING:
@@ -110,42 +109,11 @@ def carry_factor(F: Array, G: Array, U: Array, T: Array) -> None:
         for j in range(i):
             F[i, j], F[j, i] = F[j, i], F[i, j]
     clear(T[:n])
-    add_products(U, 0, F, T)
+    add_product(U, 0, F, T)
     for i in range(g):
         row = T[n + i]
         for j in range(n):
             row[j] = G[j, i]
-
-
-@kernel
-def add_products(U: Array, first: int, F: Array, out: Array) -> None:
-    """Add the rows of U (n, .), from the first column on, times F (m, k) to the first k columns of out (., .), row by row."""
-    k = F.shape[1]
-    whole = k - k % WIDE
-    for column in range(0, whole, WIDE):
-        _add_products_to(U, first, F, column, WIDE, WIDE, out)
-    for column in range(whole, k, NARROW):
-        _add_products_to(U, first, F, column, NARROW, min(k - column, NARROW), out)
-
-
-@inline_kernel
-def _add_products_to(U: Array, first: int, F: Array, column: int, count: int, some: int, out: Array) -> None:
-    """Do so for some columns, at most count: those of two rows stay in registers, as long as neither row is zero there."""
-    n, m, k, width = U.shape[0], F.shape[0], F.shape[1], out.shape[1]
-    for i in range(0, n, 2):
-        other = min(i + 1, n - 1)
-        begin, end = 0, m
-        while begin < end and U[i, first + begin] == 0.0 and U[other, first + begin] == 0.0:
-            begin += 1
-        while end > begin and U[i, first + end - 1] == 0.0 and U[other, first + end - 1] == 0.0:
-            end -= 1
-        x = get_block(out, i * width + column, count, some)
-        y = get_block(out, other * width + column, count, some)
-        for j in range(begin, end):
-            row = get_block(F, j * k + column, count, some)
-            x, y = fma(U[i, first + j], row, x), fma(U[other, first + j], row, y)
-        put_block(out, i * width + column, x, some)
-        put_block(out, other * width + column, y, some)
 
 
 def carry(
@@ -165,7 +133,7 @@ def carry(
     Raises:
         SimulationError: as of ``Simulator.advance``.
     """
-    U, T = np.array(factor.T, order="C"), np.empty((4 * simulator.nv, 2 * simulator.nv))
+    U, T = np.array(factor.T, dtype=float, order="C"), np.empty((4 * simulator.nv, 2 * simulator.nv))
     _carry(simulator, q, v, h, count, force_noise, U, T, True)
     return U.T
 
@@ -178,7 +146,7 @@ def carry_step(
     F and G as of ``Simulator.linearise``, force_noise and errors as of ``carry``.
     """
     T = np.empty((4 * simulator.nv, 2 * simulator.nv))
-    _carry(simulator, q, v, h, 1, force_noise, np.ascontiguousarray(factor.T), T, False)
+    _carry(simulator, q, v, h, 1, force_noise, np.ascontiguousarray(factor.T, dtype=float), T, False)
     return T.T
 
 
@@ -195,5 +163,5 @@ def _carry(
 ) -> None:
     """Call ``carry`` of the step (step.py)."""
     array, tangent, still = simulator.memory.array, simulator.tangent_array(), np.zeros(simulator.nv)
-    noise = np.ascontiguousarray(force_noise)
+    noise = np.ascontiguousarray(force_noise, dtype=float)
     simulator.moved(simulator.step.carry(array, tangent, q, v, still, h, count, noise, U, T, reduced), h)

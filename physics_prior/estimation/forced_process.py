@@ -11,11 +11,11 @@ accelerations of the joints as they are, so that a surprise under the foot moves
 
 import numpy as np
 
-from physics_prior.dynamics.arrays import accumulate, add_product, clear, copy
+from physics_prior.dynamics.arrays import accumulate, clear, copy
 from physics_prior.dynamics.compose import GRAVITY
-from physics_prior.dynamics.covariance import add_products
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.linear_solve import factorize_square, solve_square
+from physics_prior.dynamics.products import add_product
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.dynamics.types import Array
 from physics_prior.estimation import bearing, ground, stance
@@ -73,14 +73,14 @@ def carry_forced(F: Array, response: Array, h: float, forgotten: Array, U: Array
     """
     n, m, nv = U.shape[0], F.shape[0], response.shape[1]
     clear(by_force)
-    add_product(response, F[nv:], by_force)
+    add_product(response, 0, F[nv:], by_force)
     for i in range(by_force.shape[0]):
         for j in range(nv):
             by_force[i, nv + j] += response[i, j]
         for j in range(m):
             by_force[i, j] *= 0.5 * h
-    add_products(U, 0, F, out[:n])
-    add_products(U, m, by_force, out[:n])
+    add_product(U, 0, F, out[:n])
+    add_product(U, m, by_force, out[:n])
     for i in range(n):
         for j in range(m, n):
             out[i, j] = forgotten[j - m] * U[i, j]

@@ -19,8 +19,8 @@ from physics_prior.dynamics.arrays import clear, copy
 from physics_prior.dynamics.blocks import NARROW, WIDE, get_block, put_block
 from physics_prior.dynamics.covariance import add_rows
 from physics_prior.dynamics.kernel import inline_kernel, kernel
-from physics_prior.dynamics.memory import FLOAT, array_at
 from physics_prior.dynamics.types import Array
+from physics_prior.dynamics.views import FLOAT, array_at
 
 
 def work_size(m: int, n: int) -> int:

@@ -6,8 +6,9 @@ S is kept in Fortran's order, so that its transpose U, which the kernels reflect
 import numpy as np
 
 from physics_prior.dynamics.blocked import FEW, scratch_size, triangularise_in_blocks
-from physics_prior.dynamics.covariance import add_products, triangularise
+from physics_prior.dynamics.covariance import triangularise
 from physics_prior.dynamics.kernel import kernel
+from physics_prior.dynamics.products import add_product
 from physics_prior.dynamics.types import Array
 
 ROUNDING = 1e-10  # of the largest standard deviation: below it, another is that of a direction that constraints forbid
@@ -16,7 +17,7 @@ ROUNDING = 1e-10  # of the largest standard deviation: below it, another is that
 def covariance_of(S: np.ndarray) -> np.ndarray:
     """(k, k) S S^T of rows S (k, n) of a factor, symmetric to the last bit; summed alike on any number of cores."""
     out = np.zeros((len(S), len(S)))
-    add_products(np.ascontiguousarray(S), 0, np.ascontiguousarray(S.T), out)
+    add_product(np.ascontiguousarray(S), 0, np.ascontiguousarray(S.T), out)
     return 0.5 * (out + out.T)
 
 

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from physics_prior.dynamics.algebra import ZERO, get3, minus, put3
-from physics_prior.dynamics.arrays import add_product, clear
+from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.covariance import triangularise
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kinematics import point_jacobian
 from physics_prior.dynamics.point_force import world_velocity
+from physics_prior.dynamics.products import add_product
 from physics_prior.dynamics.sole import corner_arm, sole_pose
 from physics_prior.dynamics.types import Array, Records
 from physics_prior.estimation.gain import gain_of
@@ -87,7 +88,7 @@ def tell_slip(
     put3(scratch[:3], omega)
     put3(scratch[3:6], minus(world_velocity(work, sole.link, middle), get3(sole.velocity)))
     clear(H)
-    add_product(corners[:6], J, H)
+    add_product(corners[:6], 0, J, H)
     for row in range(6):
         y[row] = 0.0
         for c in range(6):

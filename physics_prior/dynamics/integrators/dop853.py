@@ -10,11 +10,12 @@ import math
 import numpy as np
 from scipy.integrate import DOP853
 
-from physics_prior.dynamics.arrays import accumulate, add_product, clear, copy
+from physics_prior.dynamics.arrays import accumulate, clear, copy
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.manifold import displace, displacement_derivative, rate, rate_derivative
 from physics_prior.dynamics.memory import SPARE, TIME, TOLERANCE, stage_configuration, tangent_sections
 from physics_prior.dynamics.motion import differentiate, evaluate, sections
+from physics_prior.dynamics.products import add_product
 from physics_prior.dynamics.row_system import row_count
 from physics_prior.dynamics.types import Array
 
@@ -87,7 +88,6 @@ def differentiate_part(memory: Array, tangent: Array, time: float, extra: Array,
     theta_rate, vdot = spare[SPARE + 3 : SPARE + 3 + STAGES], spare[SPARE + 3 + STAGES : SPARE + 3 + 2 * STAGES]
     theta, middle, position = spare[4], spare[5], stage_configuration(memory)
     derivative, _, _, _, _, _, stages = tangent_sections(tangent, links.shape[0], row_count(rows), nv)
-    by_q, by_v = derivative[:, :nv], derivative[:, nv:]
     start_x, theta_x, v_x, q_x = stages[5], stages[6], stages[7], stages[8]
     theta_rate_x, vdot_x = stages[9 : 9 + STAGES], stages[9 + STAGES : 9 + 2 * STAGES]
     clear(start_x)
@@ -110,8 +110,8 @@ def differentiate_part(memory: Array, tangent: Array, time: float, extra: Array,
         displacement_derivative(links, theta, start_x, theta_x, q_x)
         rate_derivative(links, theta, middle, theta_x, v_x, True, theta_rate_x[i])
         clear(vdot_x[i])
-        add_product(by_q, q_x, vdot_x[i])
-        add_product(by_v, v_x, vdot_x[i])
+        add_product(derivative, 0, q_x, vdot_x[i])
+        add_product(derivative, nv, v_x, vdot_x[i])
     clear(theta)
     clear(theta_x)
     clear(F)

@@ -3,11 +3,12 @@
 Constraints are projected after each. Of a step that goes through at once the part is the whole.
 """
 
-from physics_prior.dynamics.arrays import add_product, clear, copy
+from physics_prior.dynamics.arrays import clear, copy
 from physics_prior.dynamics.integrators.implicit_runge_kutta import attempt, differentiate_part
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.memory import TIME, tangent_sections
 from physics_prior.dynamics.motion import differentiate, evaluate, sections, settle, settle_columns, spread_noise
+from physics_prior.dynamics.products import add_product
 from physics_prior.dynamics.row_system import row_count
 from physics_prior.dynamics.types import Array
 
@@ -69,7 +70,7 @@ def linearise_smooth(
             settle_columns(memory, tangent, q, v, own, G)
             copy(F, chained)
             clear(F)
-            add_product(own, chained, F)
+            add_product(own, 0, chained, F)
             if last:
                 return rank
         else:

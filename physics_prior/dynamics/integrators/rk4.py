@@ -3,11 +3,12 @@
 In the coordinates theta of q = q0 [+] theta, a vector space, so that quaternions stay unit (Munthe-Kaas 1999).
 """
 
-from physics_prior.dynamics.arrays import accumulate, add_product, clear, copy
+from physics_prior.dynamics.arrays import accumulate, clear, copy
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.manifold import displace, displacement_derivative, rate, rate_derivative
 from physics_prior.dynamics.memory import TIME, tangent_sections
 from physics_prior.dynamics.motion import differentiate, evaluate, sections, settle, settle_columns, spread_noise
+from physics_prior.dynamics.products import add_product
 from physics_prior.dynamics.row_system import row_count
 from physics_prior.dynamics.types import Array
 
@@ -78,7 +79,6 @@ def linearise_smooth(
     copy(q, start)
     copy(v, middle)
     copy(start_x, q_x)
-    by_q, by_v = derivative[:, :nv], derivative[:, nv:]
     rank = 0
     for stage in range(4):
         rank = evaluate(memory, q, middle, extra, 0.0, vdot)
@@ -101,8 +101,8 @@ def linearise_smooth(
             copy(derivative, rate_x)
         else:
             clear(rate_x)
-            add_product(by_q, q_x, rate_x)
-            add_product(by_v, v_x, rate_x)
+            add_product(derivative, 0, q_x, rate_x)
+            add_product(derivative, nv, v_x, rate_x)
         accumulate(weight, rate_x, v_sum_x)
         clear(v_x)
         for k in range(nv):

@@ -44,9 +44,9 @@ from physics_prior.dynamics.lanes import (
     put_elements,
     put_numbers,
     those,
-    together,
+    visited,
 )
-from physics_prior.dynamics.records import ALL, FREE, PRISMATIC, REVOLUTE, SPHERICAL
+from physics_prior.dynamics.records import ALL, FREE, MOVED, PRISMATIC, REVOLUTE, SPHERICAL
 from physics_prior.dynamics.types import Array, Matrix, Records, Symmetric, Vector
 
 
@@ -214,10 +214,10 @@ def gather(links: Records, work: Records, tau: Array) -> None:
         if link.kind == FREE:
             n, here = link.v, work[i]
             moment, force = _bias(links, work, i)
-            u = minus(times(get9(here.rotation), get3(tau[n + 3 : n + 6])), moment)
+            u = minus(times(get9(here.rotation), elements(tau, 3, n + 3)), moment)
             put3(here.u, u)
             force = plus(force, transposed_times(get9(here.K), u))
-            put3(here.bias_force, minus(get3(tau[n : n + 3]), force))
+            put3(here.bias_force, minus(elements(tau, 3, n), force))
         elif some > 1:
             where, up = those(links, step, some)
             add_numbers(work, "bias_moment", up, some, _gather(links, work, tau, where, link.kind))
@@ -265,20 +265,20 @@ def _gather(links: Records, work: Records, tau: Array, where: Any, kind: int) ->
 
 
 @kernel
-def release(links: Records, work: Records, gravity: Array, end: int, vdot: Array) -> None:
-    """Run what ``gather`` left at the joints outward: accelerations of the links whose column is before end."""
+def release(links: Records, work: Records, gravity: Array, which: int, vdot: Array) -> None:
+    """Run what ``gather`` left at the joints outward: accelerations of the links, ALL or MOVED."""
     step, still = 0, scale(-1.0, get3(gravity))
     while step < links.shape[0]:
-        i, some = links[step].visit, together(links, step, end)
+        i, some = visited(links, step, which)
+        if i < 0:
+            break
         link, step = links[i], step + some
-        if link.column >= end:
-            continue
         if link.kind == FREE:
             n, here = link.v, work[i]
             acceleration = symmetric_times(get6(here.M_inverse), get3(here.bias_force))
-            put3(vdot[n : n + 3], minus(acceleration, still))
+            put_elements(vdot, n, minus(acceleration, still))
             alpha = minus(symmetric_times(get6(here.J_inverse), get3(here.u)), times(get9(here.K), acceleration))
-            put3(vdot[n + 3 : n + 6], transposed_times(get9(here.rotation), alpha))
+            put_elements(vdot, n + 3, transposed_times(get9(here.rotation), alpha))
             put_numbers(work, "alpha", i, alpha + acceleration)
         elif some > 1:
             where, up = those(links, step - some, some)
@@ -320,40 +320,41 @@ def _moved_along(kind: int, axis: Any, rate: Any, alpha: Any, acceleration: Any)
 
 
 @kernel
-def load_joints(links: Records, work: Records, end: int, forces: Array) -> None:
+def load_joints(links: Records, work: Records, forces: Array) -> None:
     """Add generalized forces (w,), run through the factors as ``push`` does, to what ``gather`` left at the joints."""
-    for i in range(links.shape[0]):
+    for step in range(links.shape[0]):
+        i, _ = visited(links, step, MOVED)
+        if i < 0:
+            break
         link, here = links[i], work[i]
         k = link.column
-        if k >= end:
-            continue
         if link.kind == REVOLUTE or link.kind == PRISMATIC:
             here.u[0] += forces[k]
         else:
             if link.kind == FREE:
-                add3(here.bias_force, get3(forces[k : k + 3]))
+                add3(here.bias_force, elements(forces, 3, k))
                 k += 3
-            add3(here.u, get3(forces[k : k + 3]))
+            add3(here.u, elements(forces, 3, k))
 
 
 @kernel
-def pull(links: Records, work: Records, z: Array, end: int, vdot: Array) -> None:
+def pull(links: Records, work: Records, z: Array, which: int, vdot: Array) -> None:
     """Run z (nv,) outward through the factors: fill vdot (nv,) = M^-1 tau, and the links' increments of acceleration.
 
-    Those of the links whose column is before end.
+    Those of the links that are asked for, ALL or MOVED.
     """
     step = 0
     while step < links.shape[0]:
-        i, some = links[step].visit, together(links, step, end)
+        i, some = visited(links, step, which)
+        if i < 0:
+            break
         link, step = links[i], step + some
-        if link.column >= end:
-            continue
         if link.kind == FREE:
             n, k, here = link.v, link.column, work[i]
-            acceleration = get3(z[k : k + 3])
-            alpha = minus(get3(z[k + 3 : k + 6]), times(get9(here.K), acceleration))
-            put3(vdot[n : n + 3], acceleration)
-            put3(vdot[n + 3 : n + 6], transposed_times(get9(here.rotation), alpha))
+            acceleration = elements(z, 3, k)
+            alpha = minus(elements(z, 3, k + 3), times(get9(here.K), acceleration))
+            put_elements(vdot, n, acceleration)
+            put_elements(vdot, n + 3, transposed_times(get9(here.rotation), alpha))
             put_numbers(work, "delta_alpha", i, alpha + acceleration)
         elif some > 1:
             where, up = those(links, step - some, some)

@@ -19,12 +19,13 @@ from physics_prior.dynamics.algebra import (
     put3,
     scale,
 )
-from physics_prior.dynamics.arrays import clear
+from physics_prior.dynamics.arrays import clear, same
 from physics_prior.dynamics.articulated_body import factorize, gather, load_joints, pull, release
+from physics_prior.dynamics.blocks import REGISTER, get_block, put_block
 from physics_prior.dynamics.constraint_errors import acceleration_error, direction, place
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.kinematics import pose, weigh
-from physics_prior.dynamics.records import ALL, BOUNDS
+from physics_prior.dynamics.records import ALL, BOUNDS, MOVED
 from physics_prior.dynamics.row_system import (
     INDEPENDENT,
     REGULARISATION,
@@ -35,8 +36,9 @@ from physics_prior.dynamics.row_system import (
     weigh_rows,
     width,
 )
-from physics_prior.dynamics.types import Array, Matrix, Records, Vector
+from physics_prior.dynamics.types import Array, Records, Vector
 from physics_prior.dynamics.unit_forces import push
+from physics_prior.dynamics.views import row_at, rows_at
 
 NOTHING = 1e-24  # square of a lever, m, that is rounding
 UNMET = 1e-11  # of the right side: more is left of rows that contradict each other, or hardly hold a motion (a fold)
@@ -45,26 +47,31 @@ ROUNDING = 1e-15  # m: no projection goes below
 
 
 @inline_kernel
-def _overlap(rows: Array, a: int, m: int, b: int, n: int, w: int, begin: int, end: int) -> Matrix:
-    """The products of m rows of Y from row a on and n rows of Z from row b on, over some columns; 1 <= m, n <= 3.
+def _couple(rows: Array, a: int, m: int, b: int, n: int, begin: int, end: int) -> None:
+    """Fill A M^-1 A^T of m rows from row a on and n rows from row b on, whose columns overlap from begin to end; 1 <= m, n <= 3.
 
-    Nine sums side by side, which do not wait for one another. Beyond m and n they mean nothing.
+    Nine sums side by side, which do not wait for one another; where rows are fewer, those of the last ones again. What that
+    leaves below the diagonal means nothing.
     """
-    y0, y1, y2 = rows[a], rows[a + min(m - 1, 1)], rows[a + m - 1]
-    z0, z1, z2 = rows[b, w:], rows[b + min(n - 1, 1), w:], rows[b + n - 1, w:]
+    w, S = width(rows), 2 * width(rows)
+    a1, a2, b1, b2 = a + min(m - 1, 1), a + m - 1, b + min(n - 1, 1), b + n - 1
+    y0, y1, y2 = row_at(rows, a, 0), row_at(rows, a1, 0), row_at(rows, a2, 0)
+    z0, z1, z2 = row_at(rows, b, w), row_at(rows, b1, w), row_at(rows, b2, w)
     s0, s1, s2, s3, s4, s5, s6, s7, s8 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(begin, end):
-        p, q, r, x, y, z = y0[k], y1[k], y2[k], z0[k], z1[k], z2[k]
+    for c in range(begin, end):
+        p, q, r, x, y, z = y0[c], y1[c], y2[c], z0[c], z1[c], z2[c]
         s0, s1, s2 = fma(p, x, s0), fma(p, y, s1), fma(p, z, s2)
         s3, s4, s5 = fma(q, x, s3), fma(q, y, s4), fma(q, z, s5)
         s6, s7, s8 = fma(r, x, s6), fma(r, y, s7), fma(r, z, s8)
-    return s0, s1, s2, s3, s4, s5, s6, s7, s8
+    rows[a, S + b], rows[a, S + b1], rows[a, S + b2] = s0, s1, s2
+    rows[a1, S + b], rows[a1, S + b1], rows[a1, S + b2] = s3, s4, s5
+    rows[a2, S + b], rows[a2, S + b1], rows[a2, S + b2] = s6, s7, s8
 
 
 @inline_kernel
 def squared_levers(rows: Array, a: int, m: int, begin: int, end: int) -> Vector:
     """The sums of the squared levers, m, of joints under the unit forces of m rows from row a on, over some columns."""
-    y0, y1, y2 = rows[a], rows[a + min(m - 1, 1)], rows[a + m - 1]
+    y0, y1, y2 = row_at(rows, a, 0), row_at(rows, a + min(m - 1, 1), 0), row_at(rows, a + m - 1, 0)
     p, q, r = 0.0, 0.0, 0.0
     for k in range(begin, end):
         p, q, r = fma(y0[k], y0[k], p), fma(y1[k], y1[k], q), fma(y2[k], y2[k], r)
@@ -89,7 +96,7 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: 
                 clear(rows[r, begin:end])
                 clear(rows[r, w + begin : w + end])
         if pair.active:
-            y, z, d = rows[first:last, :w], rows[first:last, w : 2 * w], get9(pair.d)
+            y, z, d = rows_at(rows, first, pair.rows, 0), rows_at(rows, first, pair.rows, w), get9(pair.d)
             push(links, work, pair.link_b, get3(pair.b), d, pair.rows, alone, y, z)
             if pair.link_a >= 0:
                 push(links, work, pair.link_a, get3(pair.hold), minus9(d), pair.rows, False, y, z)
@@ -102,7 +109,6 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: 
                 scales[first + r] = 0.0
             else:
                 scales[first + r] = squares[r]
-    S = rows[:, 2 * w : 2 * w + m]
     for p in range(pairs.shape[0]):
         first, count = pairs[p].first, pairs[p].rows
         begin, end, _, reach = bounds(rows, first)
@@ -111,12 +117,8 @@ def assemble(links: Records, work: Records, pairs: Records, rows: Array, known: 
             if other >= reach:
                 break
             from_, to, _, _ = bounds(rows, other)
-            block = _overlap(rows, first, count, other, number, w, max(begin, from_), min(end, to))
-            for r in range(count):
-                for s in range(number):
-                    if first + r <= other + s:
-                        S[first + r, other + s] = block[3 * r + s]
-    weigh_rows(pairs, S, scales, active)
+            _couple(rows, first, count, other, number, max(begin, from_), min(end, to))
+    weigh_rows(pairs, rows, active)
     rank, least = factorize_rows(pairs, rows, 0.0, INDEPENDENT)
     rows[m, rows.shape[1] - BOUNDS] = 1.0 if least >= INDEPENDENT else 0.0
     if least < INDEPENDENT:
@@ -132,13 +134,20 @@ def gather_rows(pairs: Records, rows: Array, offset: int, out: Array) -> None:
     for p in range(pairs.shape[0]):
         first, n = pairs[p].first, pairs[p].rows
         begin, end, _, _ = bounds(rows, first)
-        a, b, c = rows[first, offset:], rows[first + min(n - 1, 1), offset:], rows[first + n - 1, offset:]
+        a, b = row_at(rows, first, offset), row_at(rows, first + min(n - 1, 1), offset)
+        c = row_at(rows, first + n - 1, offset)
         x, y, z = answer[first], 0.0, 0.0
         if n > 1:
             y = answer[first + 1]
         if n > 2:
             z = answer[first + 2]
-        for k in range(begin, end):
+        whole = end - (end - begin) % REGISTER
+        for k in range(begin, whole, REGISTER):
+            own = get_block(out, k, REGISTER, REGISTER)
+            own = fma(x, get_block(a, k, REGISTER, REGISTER), own)
+            own = fma(z, get_block(c, k, REGISTER, REGISTER), fma(y, get_block(b, k, REGISTER, REGISTER), own))
+            put_block(out, k, own, REGISTER)
+        for k in range(whole, end):
             out[k] = fma(z, c[k], fma(y, b[k], fma(x, a[k], out[k])))
 
 
@@ -163,10 +172,7 @@ def responses(links: Records, work: Records, pairs: Records, rows: Array, z: Arr
 @kernel
 def refresh(links: Records, work: Records, pairs: Records, rows: Array, known: Array, q: Array) -> int:
     """Have the factors and rows of q (nq,) in the workspace, if they are not there yet; return the rank."""
-    k = 0
-    while work[0].factored and k < q.shape[0] and known[k] == q[k]:
-        k += 1
-    if k == q.shape[0]:
+    if work[0].factored and same(known, q):
         return int(known[-2])
     pose(links, work, q)
     place(work, pairs)
@@ -201,14 +207,13 @@ def accelerate_constrained(
     Needs ``refresh``. The system is design eq. 4 with f_c = +A^T lambda, so that pair.force acts ON link b. Of the free
     motion only what the rows touch is found; then their forces join the others at the joints. scratch (nv,).
     """
-    w = width(rows)
     gather(links, work, tau)
-    release(links, work, gravity, w, vdot)
+    release(links, work, gravity, MOVED, vdot)
     acceleration_error(work, pairs, get3(gravity), rows[row_count(rows)])
     unmet = multiply(rows)
     clear(scratch)
     gather_rows(pairs, rows, 0, scratch)
-    load_joints(links, work, w, scratch)
+    load_joints(links, work, scratch)
     release(links, work, gravity, ALL, vdot)
     m = row_count(rows)
     for p in range(pairs.shape[0]):

@@ -25,8 +25,8 @@ from physics_prior.dynamics.algebra import (
 from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.blocks import nothing
 from physics_prior.dynamics.kernel import inline_kernel, kernel
-from physics_prior.dynamics.lanes import elements, integers, numbers, put_numbers, those, together
-from physics_prior.dynamics.records import ALL, FREE, PRISMATIC, REVOLUTE, SPHERICAL
+from physics_prior.dynamics.lanes import elements, integers, numbers, put_numbers, those, visited
+from physics_prior.dynamics.records import ALL, FREE, MOVED, PRISMATIC, REVOLUTE, SPHERICAL
 from physics_prior.dynamics.spatial import inertia_about
 from physics_prior.dynamics.trigonometry import sine_and_cosine
 from physics_prior.dynamics.types import Array, Matrix, Record, Records, Spatial, Vector
@@ -53,7 +53,7 @@ def pose(links: Records, work: Records, q: Array) -> None:
         i, some = links[step].visit, links[step].together
         link = links[i]
         if link.kind == FREE:
-            k, origin = link.q, get3(q[link.q : link.q + 3])
+            k, origin = link.q, elements(q, 3, link.q)
             R = rotation_of(q[k + 3], q[k + 4], q[k + 5], q[k + 6])
             put_numbers(work, "rotation", i, R + origin + origin)
         elif some > 1:
@@ -122,18 +122,18 @@ def flow(links: Records, work: Records, v: Array) -> None:
 
 
 @kernel
-def flow_part(links: Records, work: Records, v: Array, end: int) -> None:
-    """Do so for the links whose column is before end."""
+def flow_part(links: Records, work: Records, v: Array, which: int) -> None:
+    """Do so for the links that are asked for, ALL or MOVED."""
     step = 0
     while step < links.shape[0]:
-        i, some = links[step].visit, together(links, step, end)
+        i, some = visited(links, step, which)
+        if i < 0:
+            break
         link, step = links[i], step + some
-        if link.column >= end:
-            continue
         if link.kind == FREE:
             n, here = link.v, work[i]
-            omega = times(get9(here.rotation), get3(v[n + 3 : n + 6]))
-            _put_flow(work, i, omega, get3(v[n : n + 3]), ZERO, ZERO)
+            omega = times(get9(here.rotation), elements(v, 3, n + 3))
+            _put_flow(work, i, omega, elements(v, 3, n), ZERO, ZERO)
         elif some > 1:
             where, up = those(links, step - some, some)
             over = numbers(work, "omega", 6, up)
@@ -179,12 +179,13 @@ def _nothing3(like: Any) -> Any:
 
 
 @kernel
-def take_increments(links: Records, work: Records, end: int) -> None:
-    """Fill velocities of the links whose column is before end with their increments, and accelerations at that constant rate."""
-    for i in range(links.shape[0]):
+def take_increments(links: Records, work: Records) -> None:
+    """Fill velocities of the links that constraint rows move with their increments, and accelerations at that constant rate."""
+    for step in range(links.shape[0]):
+        i, _ = visited(links, step, MOVED)
+        if i < 0:
+            break
         link, here = links[i], work[i]
-        if link.column >= end:
-            continue
         omega, velocity = get3(here.delta_alpha), get3(here.delta_acceleration)
         alpha, acceleration = ZERO, ZERO
         if link.parent >= 0:

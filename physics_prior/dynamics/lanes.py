@@ -21,9 +21,11 @@ PAIR, INDEX, BYTE = ir.VectorType(DOUBLE, 2), ir.IntType(64), ir.IntType(8)
 
 
 @inline_kernel
-def together(links: Records, step: int, end: int) -> int:
-    """How many links, from a step of a sweep on, are visited side by side: one, if not all are visited."""
-    return int(links[step].together) if end == ALL else 1
+def visited(links: Records, step: int, which: int) -> tuple[int, int]:
+    """The link that a sweep outward visits at a step, -1 behind the last, and how many side by side; which: ALL or MOVED."""
+    if which == ALL:
+        return links[step].visit, links[step].together
+    return links[step].moved, 1
 
 
 @inline_kernel

@@ -7,7 +7,7 @@ the coordinates theta of q = q0 [+] theta (Munthe-Kaas 1999), a plain vector spa
 import math
 from typing import Any
 
-from physics_prior.dynamics.algebra import cross, dot, dot_on, fma, get3, plus, put3, scale
+from physics_prior.dynamics.algebra import cross, dot, dot_on, fma, plus, scale
 from physics_prior.dynamics.blocks import at_most, either, root, size
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.lanes import elements, integers, put_elements, those
@@ -50,7 +50,7 @@ def displace(links: Records, q: Array, delta: Array, out: Array) -> None:
         link = links[i]
         k, n = link.q, link.v
         if link.kind == FREE:
-            put3(out[k : k + 3], plus(get3(q[k : k + 3]), get3(delta[n : n + 3])))
+            put_elements(out, k, plus(elements(q, 3, k), elements(delta, 3, n)))
             _displace(q, delta, out, k + 3, n + 3, SPHERICAL)
         elif some > 1:
             where = those(links, step, some)[0]

@@ -1,22 +1,20 @@
 """The memory of a compiled step: one array that holds the model, the workspace and the constraints.
 
-A call from Python costs about 0.06 us an array and 0.13 us an array of records: as much as the motion of a few links. So a
-step takes one array, and both sides see its sections as the records and matrices that they are.
+Each array that Python hands over costs about as much as the motion of a link, and one of records twice that. So a step takes
+one array, and both sides see its sections as the records and matrices that they are.
 """
 
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numba import types
-from numba.extending import intrinsic
-from numba.np.arrayobj import np_cfarray
 
 from physics_prior.dynamics.constraint_derivatives import GAP
 from physics_prior.dynamics.derivatives import COMPOSITE, FREEDOM
 from physics_prior.dynamics.kernel import inline_kernel
 from physics_prior.dynamics.records import BOUNDS, FREE_LINK, LINK, PAIR, WORK, row_bounds
 from physics_prior.dynamics.types import Array
+from physics_prior.dynamics.views import FLOAT, array_at
 
 HEAD = 12
 TIME, TOLERANCE, VECTORS, WORKSPACE, CONTACT_PART, OPEN = 6, 7, 8, 9, 10, 11
@@ -24,7 +22,6 @@ TIME, TOLERANCE, VECTORS, WORKSPACE, CONTACT_PART, OPEN = 6, 7, 8, 9, 10, 11
 the part for contacts begins (contact/memory.py), and how far off its constraints, m, the last step ended."""
 LINK_SIZE, WORK_SIZE, PAIR_SIZE = LINK.itemsize // 8, WORK.itemsize // 8, PAIR.itemsize // 8
 FREEDOM_SIZE, COMPOSITE_SIZE, GAP_SIZE = FREEDOM.itemsize // 8, COMPOSITE.itemsize // 8, GAP.itemsize // 8
-FLOAT = np.dtype(np.float64)
 SPARE = 13  # vectors (nv,) of scratch that every step needs; the last four are those of ``evaluate`` at a fold
 
 
@@ -84,19 +81,6 @@ class Memory:
         own[0].view(LINK)[:], self.pairs[:], self.parameters[:] = records, pairs, parameters
         if m:
             self.rows[:m, -BOUNDS:] = row_bounds(records, pairs, width)
-
-
-@intrinsic
-def array_at(_typing_context: Any, array: Any, index: Any, shape: Any, dtype: Any) -> Any:
-    """A bare array of that shape and dtype, C order, that begins at an element of an array: Numba's ``carray``, in one go."""
-    made = types.Array(dtype.dtype, len(shape) if isinstance(shape, types.BaseTuple) else 1, "C")
-
-    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        data = context.make_array(array)(context, builder, arguments[0]).data
-        address = builder.bitcast(builder.gep(data, [arguments[1]]), context.get_value_type(types.voidptr))
-        return np_cfarray(context, builder, made(types.voidptr, shape), (address, arguments[2]))
-
-    return made(array, types.intp, shape, dtype), build
 
 
 @inline_kernel

@@ -8,7 +8,7 @@ effects that the scene names and nothing else. ``memory`` is that of memory.py.
 import math
 
 from physics_prior.dynamics.anchor_motion import move_anchors
-from physics_prior.dynamics.arrays import add_product, clear, copy, subtract_transposed_product
+from physics_prior.dynamics.arrays import clear, copy
 from physics_prior.dynamics.articulated_body import accelerate, factorize
 from physics_prior.dynamics.constraint import POSITION_TOLERANCE, UNMET, accelerate_constrained, refresh, responses
 from physics_prior.dynamics.constraint_derivatives import differentiate_rows
@@ -20,6 +20,7 @@ from physics_prior.dynamics.manifold import displace
 from physics_prior.dynamics.mass_factor import factorize_mass, solve_mass
 from physics_prior.dynamics.memory import OPEN, SPARE, TIME, correction_sections, tangent_sections
 from physics_prior.dynamics.memory import sections as sections  # scene: links
+from physics_prior.dynamics.products import add_product, subtract_transposed_product
 from physics_prior.dynamics.projection import project
 from physics_prior.dynamics.reactions import tell_wrenches
 from physics_prior.dynamics.row_system import multiply_columns, row_count
@@ -131,7 +132,7 @@ def differentiate(memory: Array, tangent: Array, q: Array, v: Array, step: float
         response, right, answer, change = correction_sections(scratch, m, nv, 2 * nv)
         responses(links, work, pairs, rows, spare[0], response)
         clear(right)
-        add_product(A, derivative, right)
+        add_product(A, 0, derivative, right)
         for r in range(m):
             for j in range(nv):
                 right[r, j] += rows_q[r, j]
@@ -169,7 +170,7 @@ def project_columns(memory: Array, A: Array, A_q: Array, columns: Array, scratch
     response, right, answer, change = correction_sections(scratch, m, nv, columns.shape[1])
     responses(links, work, pairs, rows, spare[0], response)
     clear(right)
-    add_product(A, by_q, right)
+    add_product(A, 0, by_q, right)
     if as_caught:
         for p in range(pairs.shape[0]):
             if pairs[p].here:
@@ -178,8 +179,8 @@ def project_columns(memory: Array, A: Array, A_q: Array, columns: Array, scratch
     multiply_columns(rows, right, answer, change)
     subtract_transposed_product(response, answer, by_q)
     clear(right)
-    add_product(A, by_v, right)
-    add_product(A_q, by_q, right)
+    add_product(A, 0, by_v, right)
+    add_product(A_q, 0, by_q, right)
     multiply_columns(rows, right, answer, change)
     subtract_transposed_product(response, answer, by_v)
 

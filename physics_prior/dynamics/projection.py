@@ -16,7 +16,7 @@ from physics_prior.dynamics.constraint_errors import (
 from physics_prior.dynamics.kernel import kernel
 from physics_prior.dynamics.kinematics import flow_part, pose, take_increments
 from physics_prior.dynamics.manifold import displace
-from physics_prior.dynamics.records import ALL
+from physics_prior.dynamics.records import ALL, MOVED
 from physics_prior.dynamics.row_system import REFINEMENTS, multiply, multiply_once, row_count, width
 from physics_prior.dynamics.types import Array, Records
 
@@ -96,7 +96,7 @@ def meet(
         before = left
         multiply_once(rows)
         gather_rows(pairs, rows, w, z)
-        pull(links, work, z, w, delta)
+        pull(links, work, z, MOVED, delta)
         left = error_beyond(work, pairs, errors, right)
         if index > 0 and left > 0.5 * target:
             left = extrapolate(pairs, rows, right, last, z)
@@ -136,7 +136,7 @@ def bend(links: Records, work: Records, pairs: Records, rows: Array) -> None:
     """
     m = row_count(rows)
     right, seen, errors = rows[m], rows[m + 1], rows[m + 2]
-    take_increments(links, work, width(rows))
+    take_increments(links, work)
     acceleration_error(work, pairs, ZERO, seen)
     for p in range(pairs.shape[0]):
         if pairs[p].motion == 0:
@@ -148,7 +148,7 @@ def bend(links: Records, work: Records, pairs: Records, rows: Array) -> None:
 @kernel
 def project_velocity(links: Records, work: Records, pairs: Records, rows: Array, v: Array, spare: Array) -> None:
     """Put v (nv,) onto the constraints by the impulse that takes it there (design eq. 9); needs factors and rows of q."""
-    flow_part(links, work, v, width(rows))
+    flow_part(links, work, v, MOVED)
     velocity_error(work, pairs, rows[row_count(rows)])
     multiply(rows)
     respond(links, work, pairs, rows, spare[0], spare[1])

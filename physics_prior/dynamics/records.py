@@ -10,8 +10,8 @@ from physics_prior.effects.effect import PointPair
 from physics_prior.model import JointKind, Link, Tree
 from physics_prior.model.joint import FREEDOMS
 
-ALL = 1 << 62
-"""Beyond every column: the end of a range that leaves no link out."""
+ALL, MOVED = 0, 1
+"""The links that a sweep outward visits: all, or those that constraint rows move."""
 LANES, ENOUGH = 4, 3
 """Links that sweeps visit side by side: at most, and at least, as their numbers have to be brought there."""
 BOUNDS = 4
@@ -22,6 +22,7 @@ LINK = np.dtype(
     [
         ("visit", "i8"),  # of the i-th record: which link sweeps visit i-th outward, those alike one after another
         ("together", "i8"),  # ... of how many, alike, it is one, which sweeps visit side by side
+        ("moved", "i8"),  # ... which link is the i-th outward of those that constraint rows move, -1 behind the last
         (
             "turning",
             "i8",
@@ -131,6 +132,7 @@ def link_records(tree: Tree, *touched: np.ndarray) -> np.ndarray:
     """The tree's moving parts as LINK records (N,), held by records with a link_a and a link_b each."""
     records = np.zeros(len(tree.links), dtype=LINK)
     moved = _moved_links(tree, touched)
+    records["moved"] = (sorted(moved) + [-1] * len(records))[: len(records)]
     column = 0
     for i in sorted(range(len(records)), key=lambda i: i not in moved):
         records[i]["column"] = column

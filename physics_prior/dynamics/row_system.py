@@ -53,46 +53,77 @@ def bounds(rows: Array, r: int) -> tuple[int, int, int, int]:
 def factorize_rows(pairs: Records, rows: Array, regularisation: float, enough: float) -> tuple[int, float]:
     """Fill the Cholesky factor of A M^-1 A^T, regularised by a share of each row's scale; return the rank and the least pivot.
 
-    Pivots are relative to their rows' scales. The first that is not ``enough`` ends it.
+    Pivots are relative to their rows' scales. The first pair that has one that is not ``enough`` ends it. A pair's rows, three or
+    fewer, go side by side: their sums do not wait for one another.
     """
     m, w = row_count(rows), width(rows)
-    S, L, scales = rows[:, 2 * w : 2 * w + m], rows[:, 2 * w + m : 2 * w + 2 * m], rows[m + 2]
+    S, L, scales = 2 * w, 2 * w + m, rows[m + 2]
     rank, least = 0, math.inf
     for p in range(pairs.shape[0]):
         pair = pairs[p]
-        for s in range(pair.first, pair.first + pair.rows):
-            _, _, first, _ = bounds(rows, s)
-            epsilon = regularisation * scales[s]
-            pivot = S[s, s] + epsilon
-            for r in range(first, s):
-                left = S[r, s]
-                for k in range(first, r):
-                    left = fma(-L[k, r], L[k, s], left)
-                L[r, s] = left
-                pivot = fma(-left * L[r, r], left, pivot)
-            for r in range(first, s):
-                L[r, s] *= L[r, r]
-            if pivot > DEPENDENT * epsilon:
-                rank += 1
-            pivot = max(pivot, 1e-3 * epsilon)
-            if pair.active:
-                least = min(least, pivot / scales[s])
-            if least < enough:
-                return rank, least
-            L[s, s] = 1.0 / pivot if pivot > 0.0 else 0.0
+        s, n = pair.first, pair.rows
+        t, u = s + min(n - 1, 1), s + n - 1  # the last again where there are fewer
+        first = bounds(rows, s)[2]
+        shift_s, shift_t, shift_u = regularisation * scales[s], regularisation * scales[t], regularisation * scales[u]
+        ss, st, su = rows[s, S + s] + shift_s, rows[s, S + t], rows[s, S + u]
+        tt, tu, uu = rows[t, S + t] + shift_t, rows[t, S + u], rows[u, S + u] + shift_u
+        for r in range(first, s):
+            x, y, z = rows[r, S + s], rows[r, S + t], rows[r, S + u]
+            for k in range(first, r):
+                known = rows[k, L + r]
+                x, y, z = fma(-known, rows[k, L + s], x), fma(-known, rows[k, L + t], y), fma(-known, rows[k, L + u], z)
+            rows[r, L + s], rows[r, L + t], rows[r, L + u] = x, y, z
+            inverse = rows[r, L + r]
+            a, b = -x * inverse, -y * inverse
+            ss, st, su = fma(a, x, ss), fma(a, y, st), fma(a, z, su)
+            tt, tu, uu = fma(b, y, tt), fma(b, z, tu), fma(-z * inverse, z, uu)
+        for r in range(first, s):
+            inverse = rows[r, L + r]
+            x, y, z = rows[r, L + s] * inverse, rows[r, L + t] * inverse, rows[r, L + u] * inverse
+            rows[r, L + s], rows[r, L + t], rows[r, L + u] = x, y, z
+        share, inverse, counts = _pivot(ss, shift_s, scales[s])
+        rank += counts
+        rows[s, L + s] = inverse
+        if n > 1:
+            a = st * inverse
+            rows[s, L + t] = a
+            tt, tu = fma(-a, st, tt), fma(-a, su, tu)
+            b = su * inverse
+            own, inverse, counts = _pivot(tt, shift_t, scales[t])
+            rank, share = rank + counts, min(share, own)
+            rows[t, L + t] = inverse
+            if n > 2:
+                c = tu * inverse
+                rows[s, L + u], rows[t, L + u] = b, c
+                own, inverse, counts = _pivot(fma(-c, tu, fma(-b, su, uu)), shift_u, scales[u])
+                rank, share = rank + counts, min(share, own)
+                rows[u, L + u] = inverse
+        if pair.active:
+            least = min(least, share)
+        if least < enough:
+            break
     return rank, least
 
 
+@inline_kernel
+def _pivot(pivot: float, shift: float, scale: float) -> tuple[float, float, int]:
+    """A pivot relative to its row's scale, its inverse, and what its row adds to the rank; shift: by which it is regularised."""
+    counts = 1 if pivot > DEPENDENT * shift else 0
+    pivot = max(pivot, 1e-3 * shift)
+    return pivot / scale, 1.0 / pivot if pivot > 0.0 else 0.0, counts
+
+
 @kernel
-def weigh_rows(pairs: Records, S: Array, scales: Array, active: int) -> None:
-    """Replace the rows' squared levers, m^2, in scales by what the diagonal of S = A M^-1 A^T would be of usual levers.
+def weigh_rows(pairs: Records, rows: Array, active: int) -> None:
+    """Replace the rows' squared levers, m^2, among the changes by what the diagonal of A M^-1 A^T would be of usual levers.
 
     That is the mean squared lever of the active rows, over the inertia that the rows between two links meet. So a row is
     weak by its lever (a fold), not because a link elsewhere is light. Of rows between the same links it is one number, so
     that redundant ones share by least multipliers.
     """
-    levers, first = 0.0, 0
-    for r in range(S.shape[0]):
+    m, S, levers, first = row_count(rows), 2 * width(rows), 0.0, 0
+    scales = rows[m + 2]
+    for r in range(m):
         levers += scales[r]
     for p in range(pairs.shape[0]):
         pair, last = pairs[p], pairs[p].first + pairs[p].rows
@@ -100,7 +131,7 @@ def weigh_rows(pairs: Records, S: Array, scales: Array, active: int) -> None:
             continue
         mobility, own = 0.0, 0.0
         for r in range(first, last):
-            mobility += S[r, r]
+            mobility += rows[r, S + r]
             own += scales[r]
         scale = mobility / own * levers / active if own > 0.0 else 1.0
         for r in range(first, last):
@@ -153,35 +184,42 @@ def _solve(rows: Array, out: Array) -> None:
 
     Beyond a row's bounds the factor is zero.
     """
-    m, w = row_count(rows), width(rows)
-    left, L = rows[m], rows[:, 2 * w + m : 2 * w + 2 * m]
-    s = 0
+    m = row_count(rows)
+    left, L, s = rows[m], 2 * width(rows) + m, 0
     while s + 2 < m:
         x, y, z = left[s], left[s + 1], left[s + 2]
         for r in range(bounds(rows, s)[2], s):
             known = out[r]
-            x, y, z = fma(-L[r, s], known, x), fma(-L[r, s + 1], known, y), fma(-L[r, s + 2], known, z)
-        y = fma(-L[s, s + 1], x, y)
-        out[s], out[s + 1], out[s + 2] = x, y, fma(-L[s + 1, s + 2], y, fma(-L[s, s + 2], x, z))
+            x, y, z = (
+                fma(-rows[r, L + s], known, x),
+                fma(-rows[r, L + s + 1], known, y),
+                fma(-rows[r, L + s + 2], known, z),
+            )
+        y = fma(-rows[s, L + s + 1], x, y)
+        out[s], out[s + 1], out[s + 2] = x, y, fma(-rows[s + 1, L + s + 2], y, fma(-rows[s, L + s + 2], x, z))
         s += 3
     for t in range(s, m):
         x = left[t]
         for r in range(bounds(rows, t)[2], t):
-            x = fma(-L[r, t], out[r], x)
+            x = fma(-rows[r, L + t], out[r], x)
         out[t] = x
     for t in range(m - 1, s - 1, -1):
-        x = out[t] * L[t, t]
+        x = out[t] * rows[t, L + t]
         for r in range(t + 1, bounds(rows, t)[3]):
-            x = fma(-L[t, r], out[r], x)
+            x = fma(-rows[t, L + r], out[r], x)
         out[t] = x
     while s > 0:
         s -= 3
-        x, y, z = out[s] * L[s, s], out[s + 1] * L[s + 1, s + 1], out[s + 2] * L[s + 2, s + 2]
+        x, y, z = out[s] * rows[s, L + s], out[s + 1] * rows[s + 1, L + s + 1], out[s + 2] * rows[s + 2, L + s + 2]
         for r in range(s + 3, bounds(rows, s + 2)[3]):
             known = out[r]
-            x, y, z = fma(-L[s, r], known, x), fma(-L[s + 1, r], known, y), fma(-L[s + 2, r], known, z)
-        y = fma(-L[s + 1, s + 2], z, y)
-        out[s], out[s + 1], out[s + 2] = fma(-L[s, s + 1], y, fma(-L[s, s + 2], z, x)), y, z
+            x, y, z = (
+                fma(-rows[s, L + r], known, x),
+                fma(-rows[s + 1, L + r], known, y),
+                fma(-rows[s + 2, L + r], known, z),
+            )
+        y = fma(-rows[s + 1, L + s + 2], z, y)
+        out[s], out[s + 1], out[s + 2] = fma(-rows[s, L + s + 1], y, fma(-rows[s, L + s + 2], z, x)), y, z
 
 
 @kernel

@@ -15,7 +15,7 @@ from physics_prior.dynamics.formulations.generalized import mixed_accelerations
 from physics_prior.dynamics.kinematics import pose
 from physics_prior.dynamics.manifold import displace
 from physics_prior.dynamics.projection import extrapolate, meet
-from physics_prior.dynamics.records import BOUNDS
+from physics_prior.dynamics.records import BOUNDS, MOVED
 from physics_prior.dynamics.row_system import independent, multiply, multiply_once, width
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects.attachment import Attachment, Hinge, Rod, Weld
@@ -306,7 +306,7 @@ def test_extrapolation_leaves_what_it_tells():
     errors, last = rows[m].copy(), np.zeros(m)
 
     def left():
-        pull(links, work, z, width(rows), delta)
+        pull(links, work, z, MOVED, delta)
         return error_beyond(work, pairs, errors, rows[m])
 
     for _ in range(2):

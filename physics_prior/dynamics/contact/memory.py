@@ -7,8 +7,9 @@ import numpy as np
 from physics_prior.dynamics.contact.geometry.pairs import ASKED, ROW, SLOTS
 from physics_prior.dynamics.contact.records import CANDIDATE, CONTACT
 from physics_prior.dynamics.kernel import inline_kernel
-from physics_prior.dynamics.memory import CONTACT_PART, FLOAT, array_at
+from physics_prior.dynamics.memory import CONTACT_PART
 from physics_prior.dynamics.types import Array
+from physics_prior.dynamics.views import FLOAT, array_at
 
 HEAD = 10
 CANDIDATE_SIZE, CONTACT_SIZE = CANDIDATE.itemsize // 8, CONTACT.itemsize // 8

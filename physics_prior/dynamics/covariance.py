@@ -162,6 +162,6 @@ def _carry(
     reduced: bool,
 ) -> None:
     """Call ``carry`` of the step (step.py)."""
-    array, tangent, still = simulator.memory.array, simulator.tangent_array(), np.zeros(simulator.nv)
+    array, tangent, still = simulator.memory.array, simulator.tangent_array(), simulator.still
     noise = np.ascontiguousarray(force_noise, dtype=float)
     simulator.moved(simulator.step.carry(array, tangent, q, v, still, h, count, noise, U, T, reduced), h)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numba import types
 
+from physics_prior.dynamics.views import FLOAT
 from physics_prior.errors import SimulationError
 
 if TYPE_CHECKING:
@@ -46,18 +47,22 @@ class Step:
 
 def require_state(simulator: "Simulator", q: np.ndarray, v: np.ndarray, tau: np.ndarray | None) -> np.ndarray:
     """Return tau, zeros where it is None, if a step can take these: floats (nq,), (nv,), (nv,). Raise SimulationError if not."""
-    nv = simulator.nv
-    tau = np.zeros(nv) if tau is None else tau
-    for name, array, size in (("q", q, simulator.nq), ("v", v, nv), ("tau", tau, nv)):
-        if not (isinstance(array, np.ndarray) and array.dtype.char == "d" and array.shape == (size,)):
-            raise SimulationError(f"{name} is {_told(array)}: a NumPy array of {size} floats (float64) is valid")
-        if not array.flags.carray:
-            raise SimulationError(f"{name} is read-only, or its numbers stand apart in memory: a copy of it is valid")
+    nq, nv, tau = simulator.nq, simulator.nv, simulator.still if tau is None else tau
+    if not (_fits(q, nq) and _fits(v, nv) and (tau is simulator.still or _fits(tau, nv))):
+        given = ("q", q, nq), ("v", v, nv), ("tau", tau, nv)
+        name, array, size = next(each for each in given if not _fits(*each[1:]))
+        raise SimulationError(f"{name} is {_told(array, size)}")
     return tau
 
 
-def _told(array: Any) -> str:
-    """What was given in place of an array of floats."""
-    if isinstance(array, np.ndarray):
-        return f"an array of shape {array.shape} and type {array.dtype}"
-    return f"a {type(array).__name__}"
+def _fits(array: np.ndarray, size: int) -> bool:
+    """Whether machine code reads an array as so many floats."""
+    return isinstance(array, np.ndarray) and array.dtype == FLOAT and array.shape == (size,) and array.flags.carray
+
+
+def _told(array: Any, size: int) -> str:
+    """What was given in place of an array of so many floats, and what is valid."""
+    if isinstance(array, np.ndarray) and array.dtype == FLOAT and array.shape == (size,):
+        return "read-only, or its numbers stand apart in memory: a copy of it is valid"
+    shown = f"an array of shape {array.shape} and type {array.dtype}" if isinstance(array, np.ndarray) else ""
+    return f"{shown or f'a {type(array).__name__}'}: a NumPy array of {size} floats (float64) is valid"

@@ -45,6 +45,7 @@ class Simulator:
         held: whether anything, a joint or an effect, can exert a wrench: not so of free bodies that nothing holds.
         unknown: the unknown forces and the values that they have now (unknown_forces.py).
         switches: which of the effects act now, and what happens when they take hold (switches.py).
+        still: (nv,) zeros: no velocity, no force.
         interval: s, over which impulses of contact are told as forces: the step size.
         step, memory: the compiled step (entry.py) and the array it works in (memory.py).
         rank: rank of the constraint rows at the last evaluation (below ``rows`` where some are redundant: then the motion is
@@ -118,7 +119,7 @@ class Simulator:
         self.step = Step(step_module(effects, structure, integrator, sleep is not None))
         self._rotations, self._origins = self._work["rotation"].reshape(-1, 3, 3), self._work["origin"]
         self._frames: dict[Any, tuple[int, np.ndarray, np.ndarray]] = {}
-        self._vdot, self._tangent = np.zeros(self.nv), np.zeros(0)
+        self.still, self._vdot, self._tangent = np.zeros(self.nv), np.zeros(self.nv), np.zeros(0)
         self._stores = any(effect.compiled is not None and effect.compiled.energy is not None for effect in effects)
         self._posed = np.zeros(self.nq)
         self.switches = Switches(self, {label: (first, last) for label, first, last in labels})
@@ -261,7 +262,7 @@ class Simulator:
     def mass_matrix(self, q: np.ndarray) -> np.ndarray:
         """(nv, nv) generalized inertia at q."""
         M = np.zeros((self.nv, self.nv))
-        self.move(q, np.zeros(self.nv))
+        self.move(q, self.still)
         newton_euler.mass_matrix(self._links, self._work, M)
         return M
 

@@ -74,11 +74,14 @@ def reflect(
             R[i, j] = noise[j, i]
     for begin in range(0, m, NARROW):
         some = min(m - begin, NARROW)
-        for k in range(n):
-            own = get_block(H, begin, NARROW, 0)
+        for k in range(0, n, 2):
+            other = min(k + 1, n - 1)
+            a, b = get_block(H, begin, NARROW, 0), get_block(H, begin, NARROW, 0)
             for j in range(h):
-                own = fma(U[k, first + j], get_block(H, j * m + begin, NARROW, some), own)
-            put_block(B, k * width + begin, own, NARROW)
+                own = get_block(H, j * m + begin, NARROW, some)
+                a, b = fma(U[k, first + j], own, a), fma(U[other, first + j], own, b)
+            put_block(B, k * width + begin, a, NARROW)
+            put_block(B, other * width + begin, b, NARROW)
     reflect_onto(R, B, share, leads, scales)
     copy(y, white)
     add_rows(about, H, white)
@@ -93,9 +96,10 @@ def reflect(
             total = fma(-products[i, j], share[j], total)
         share[i] = total * scales[i]
     for k in range(n):
-        z[k] = 0.0
+        total = 0.0
         for i in range(m):
-            z[k] = fma(-share[i], B[k, i], z[k])
+            total = fma(-share[i], B[k, i], total)
+        z[k] = total
     clear(correction)
     add_rows(z, U, correction)
     largest = 0.0
@@ -120,20 +124,29 @@ def apply(work: Array, m: int, U: Array, out: Array) -> None:
 def _apply_to_columns(
     B: Array, products: Array, scales: Array, U: Array, begin: int, count: int, some: int, rows: Array, out: Array
 ) -> None:
-    """Do so for some, at most count, columns."""
+    """Do so for some, at most count, columns; two rows of what is found at once, so that what they are made of is read once."""
     m, n = rows.shape
-    for i in range(m):
-        own = get_block(U, begin, count, 0)
+    for i in range(0, m, 2):
+        other = min(i + 1, m - 1)
+        x, y = get_block(U, begin, count, 0), get_block(U, begin, count, 0)
         for k in range(n):
-            own = fma(B[k, i], get_block(U, k * n + begin, count, some), own)
+            own = get_block(U, k * n + begin, count, some)
+            x, y = fma(B[k, i], own, x), fma(B[k, other], own, y)
         for j in range(i):
-            own = fma(-products[j, i], get_block(rows, j * n + begin, count, some), own)
-        put_block(rows, i * n + begin, scales[i] * own, some)
-    for k in range(n):
-        own = get_block(U, k * n + begin, count, some)
+            own = get_block(rows, j * n + begin, count, some)
+            x, y = fma(-products[j, i], own, x), fma(-products[j, other], own, y)
+        x = scales[i] * x
+        put_block(rows, i * n + begin, x, some)
+        if other > i:
+            put_block(rows, other * n + begin, scales[other] * fma(-products[i, other], x, y), some)
+    for k in range(0, n, 2):
+        other = min(k + 1, n - 1)
+        x, y = get_block(U, k * n + begin, count, some), get_block(U, other * n + begin, count, some)
         for i in range(m):
-            own = fma(-B[k, i], get_block(rows, i * n + begin, count, some), own)
-        put_block(out, k * n + begin, own, some)
+            own = get_block(rows, i * n + begin, count, some)
+            x, y = fma(-B[k, i], own, x), fma(-B[other, i], own, y)
+        put_block(out, k * n + begin, x, some)
+        put_block(out, other * n + begin, y, some)
 
 
 @kernel

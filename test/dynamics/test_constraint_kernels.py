@@ -15,7 +15,7 @@ from physics_prior.dynamics.formulations.generalized import mixed_accelerations
 from physics_prior.dynamics.kinematics import pose
 from physics_prior.dynamics.manifold import displace
 from physics_prior.dynamics.projection import extrapolate, meet
-from physics_prior.dynamics.records import BOUNDS, MOVED
+from physics_prior.dynamics.records import ALL, BOUNDS, MOVED
 from physics_prior.dynamics.row_system import independent, multiply, multiply_once, width
 from physics_prior.dynamics.simulator import Simulator
 from physics_prior.effects.attachment import Attachment, Hinge, Rod, Weld
@@ -23,6 +23,7 @@ from physics_prior.effects.effect import Effect
 from physics_prior.effects.gravity import Gravity
 from physics_prior.model import Joint, JointKind, Part, Tree
 from physics_prior.studies.bench import Ours
+from physics_prior.studies.bench_models import humanlike
 from physics_prior.studies.problems.four_bar import four_bar
 
 FIELD = np.array([0.3, -0.2, -9.81])
@@ -266,6 +267,58 @@ def test_rows_that_are_independent_are_solved_as_they_are(redundant):
     rows[m, :m] = right
     assert multiply(rows) < 1e-14  # measured 2e-16
     assert off(S @ rows[m + 1, :m], right) < 1e-13  # measured 3e-16
+
+
+@pytest.mark.parametrize("tied", [False, True])
+def test_the_factor_of_rows_makes_their_system(tied):
+    """L^T D L = A M^-1 A^T, of pairs with one, two and three rows."""
+    tree = humanlike()
+    simulator = Simulator(tree)
+    q, v = tree.integrate(tree.neutral(), 0.3 * np.sin(np.arange(tree.nv))), np.zeros(tree.nv)
+    simulator.move(q, v)
+    one, two, three = "left_hand", "right_foot", "head"
+    places = {part: tuple(simulator.pose(part)[0]) for part in (one, two, three)}
+    y = (0.0, 1.0, 0.0)
+    effects = [
+        Attachment(name="pin", part=one, at=places[one]),
+        Rod(name="rod", part=two, at=(0.0, 0.0, 5.0), length=1.0),
+        Hinge(name="hinge", part=three, at=places[three], axis=y, to_axis=y),
+    ]
+    if tied:
+        effects.insert(1, Rod(name="tie", part="right_hand", to=two, length=1.0))
+    held = Simulator(tree, [GRAVITY, *effects])
+    memory, m = held.memory, held.rows
+    refresh(memory.links, memory.work, memory.pairs, memory.rows, memory.known, q)
+    w = width(memory.rows)
+    S, L = np.triu(memory.rows[:m, 2 * w : 2 * w + m]), np.triu(memory.rows[:m, 2 * w + m : 2 * w + 2 * m])
+    D, L = 1.0 / np.diag(L), np.triu(L, 1) + np.eye(m)
+    assert held.rows == 9 + tied
+    assert independent(memory.rows)
+    assert off(np.triu(L.T @ np.diag(D) @ L), S) < 1e-14  # measured 1.3e-16
+
+
+def test_what_rows_move_is_swept_alone():
+    """Increments of what rows move are those that a sweep over all links gives; the others' are left as they are."""
+    simulator = Ours().held
+    memory, nv = simulator.memory, simulator.nv
+    refresh(memory.links, memory.work, memory.pairs, memory.rows, memory.known, Ours().postures[0].q)
+    z = np.random.default_rng(1).normal(size=nv)
+    every, moved = np.zeros(nv), np.full(nv, 7.0)
+    pull(memory.links, memory.work, z, ALL, every)
+    pull(memory.links, memory.work, z, MOVED, moved)
+    columns = np.concatenate([np.arange(link["column"], link["column"] + n) for link, n in freedoms_of(simulator)])
+    by_column = np.argsort(columns)
+    w = width(memory.rows)
+    assert 0 < w < nv
+    assert np.array_equal(moved[by_column[:w]], every[by_column[:w]])
+    assert np.all(moved[by_column[w:]] == 7.0)
+
+
+def freedoms_of(simulator):
+    """The records of links in the order of v, each with its degrees of freedom."""
+    links = simulator.memory.links
+    ends = [*links["v"][1:], simulator.nv]
+    return [(link, end - link["v"]) for link, end in zip(links, ends, strict=True)]
 
 
 @pytest.mark.parametrize("far", [1e-5, 3e-5])

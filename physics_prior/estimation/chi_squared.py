@@ -5,11 +5,12 @@ Those of scipy.stats, without what else that holds, which takes longer to load t
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import gammaincinv
 
 
 def quantile(probability: float, dimension: ArrayLike) -> np.ndarray:
     """What a square of this dimension, or of each of several, is below with this probability."""
+    from scipy.special import gammaincinv  # here: it takes a tenth of what a command takes to start, and few ask
+
     return np.asarray(2.0 * gammaincinv(0.5 * np.asarray(dimension), probability))
 
 

@@ -95,6 +95,15 @@ def test_help_and_version_import_nothing_heavy():
         subprocess.run([sys.executable, "-c", script, *words], check=True, capture_output=True)
 
 
+def test_a_check_loads_no_special_functions():
+    """They take longer to load than NumPy, and quantiles of uncertainty are asked for elsewhere."""
+    script = (
+        "import sys\nfrom physics_prior.cli import main\n"
+        "assert main(['check', 'free_body']) == 0\nassert 'scipy.special' not in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True, capture_output=True)
+
+
 def test_help_names_every_command_and_each_gives_examples(capsys):
     code, out, _ = run(capsys, "--help")
     assert code == 0

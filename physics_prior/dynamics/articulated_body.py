@@ -46,7 +46,7 @@ from physics_prior.dynamics.lanes import (
     those,
     visited,
 )
-from physics_prior.dynamics.records import ALL, FREE, MOVED, PRISMATIC, REVOLUTE, SPHERICAL
+from physics_prior.dynamics.records import ALL, FREE, PRISMATIC, REVOLUTE, SPHERICAL
 from physics_prior.dynamics.types import Array, Matrix, Records, Symmetric, Vector
 
 
@@ -323,7 +323,7 @@ def _moved_along(kind: int, axis: Any, rate: Any, alpha: Any, acceleration: Any)
 def load_joints(links: Records, work: Records, forces: Array) -> None:
     """Add generalized forces (w,), run through the factors as ``push`` does, to what ``gather`` left at the joints."""
     for step in range(links.shape[0]):
-        i, _ = visited(links, step, MOVED)
+        i = links[step].moved
         if i < 0:
             break
         link, here = links[i], work[i]

@@ -38,7 +38,7 @@ from physics_prior.dynamics.row_system import (
 )
 from physics_prior.dynamics.types import Array, Records, Vector
 from physics_prior.dynamics.unit_forces import push
-from physics_prior.dynamics.views import row_at, rows_at
+from physics_prior.dynamics.views import rows_at, three_rows
 
 NOTHING = 1e-24  # square of a lever, m, that is rounding
 UNMET = 1e-11  # of the right side: more is left of rows that contradict each other, or hardly hold a motion (a fold)
@@ -55,8 +55,7 @@ def _couple(rows: Array, a: int, m: int, b: int, n: int, begin: int, end: int) -
     """
     w, S = width(rows), 2 * width(rows)
     a1, a2, b1, b2 = a + min(m - 1, 1), a + m - 1, b + min(n - 1, 1), b + n - 1
-    y0, y1, y2 = row_at(rows, a, 0), row_at(rows, a1, 0), row_at(rows, a2, 0)
-    z0, z1, z2 = row_at(rows, b, w), row_at(rows, b1, w), row_at(rows, b2, w)
+    (y0, y1, y2), (z0, z1, z2) = three_rows(rows, a, m, 0), three_rows(rows, b, n, w)
     s0, s1, s2, s3, s4, s5, s6, s7, s8 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for c in range(begin, end):
         p, q, r, x, y, z = y0[c], y1[c], y2[c], z0[c], z1[c], z2[c]
@@ -71,7 +70,7 @@ def _couple(rows: Array, a: int, m: int, b: int, n: int, begin: int, end: int) -
 @inline_kernel
 def squared_levers(rows: Array, a: int, m: int, begin: int, end: int) -> Vector:
     """The sums of the squared levers, m, of joints under the unit forces of m rows from row a on, over some columns."""
-    y0, y1, y2 = row_at(rows, a, 0), row_at(rows, a + min(m - 1, 1), 0), row_at(rows, a + m - 1, 0)
+    y0, y1, y2 = three_rows(rows, a, m, 0)
     p, q, r = 0.0, 0.0, 0.0
     for k in range(begin, end):
         p, q, r = fma(y0[k], y0[k], p), fma(y1[k], y1[k], q), fma(y2[k], y2[k], r)
@@ -134,8 +133,7 @@ def gather_rows(pairs: Records, rows: Array, offset: int, out: Array) -> None:
     for p in range(pairs.shape[0]):
         first, n = pairs[p].first, pairs[p].rows
         begin, end, _, _ = bounds(rows, first)
-        a, b = row_at(rows, first, offset), row_at(rows, first + min(n - 1, 1), offset)
-        c = row_at(rows, first + n - 1, offset)
+        a, b, c = three_rows(rows, first, n, offset)
         x, y, z = answer[first], 0.0, 0.0
         if n > 1:
             y = answer[first + 1]

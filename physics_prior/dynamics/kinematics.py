@@ -26,7 +26,7 @@ from physics_prior.dynamics.arrays import clear
 from physics_prior.dynamics.blocks import nothing
 from physics_prior.dynamics.kernel import inline_kernel, kernel
 from physics_prior.dynamics.lanes import elements, integers, numbers, put_numbers, those, visited
-from physics_prior.dynamics.records import ALL, FREE, MOVED, PRISMATIC, REVOLUTE, SPHERICAL
+from physics_prior.dynamics.records import ALL, FREE, PRISMATIC, REVOLUTE, SPHERICAL
 from physics_prior.dynamics.spatial import inertia_about
 from physics_prior.dynamics.trigonometry import sine_and_cosine
 from physics_prior.dynamics.types import Array, Matrix, Record, Records, Spatial, Vector
@@ -182,7 +182,7 @@ def _nothing3(like: Any) -> Any:
 def take_increments(links: Records, work: Records) -> None:
     """Fill velocities of the links that constraint rows move with their increments, and accelerations at that constant rate."""
     for step in range(links.shape[0]):
-        i, _ = visited(links, step, MOVED)
+        i = links[step].moved
         if i < 0:
             break
         link, here = links[i], work[i]

@@ -27,8 +27,17 @@ def array_at(_typing_context: Any, array: Any, index: Any, shape: Any, dtype: An
 
 
 @inline_kernel
-def row_at(matrix: Array, r: int, column: int) -> Array:
-    """The r-th row of a matrix in C order from a column on."""
+def three_rows(matrix: Array, r: int, count: int, column: int) -> tuple[Array, Array, Array]:
+    """Three rows of a matrix in C order from the r-th on, each from a column on; the last again where count is less."""
+    return (
+        _row(matrix, r, column),
+        _row(matrix, r + min(count - 1, 1), column),
+        _row(matrix, r + count - 1, column),
+    )
+
+
+@inline_kernel
+def _row(matrix: Array, r: int, column: int) -> Array:
     row: Array = array_at(matrix, r * matrix.shape[1] + column, matrix.shape[1] - column, FLOAT)
     return row
 

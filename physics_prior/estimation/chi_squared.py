@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 def quantile(probability: float, dimension: ArrayLike) -> np.ndarray:
     """What a square of this dimension, or of each of several, is below with this probability."""
-    from scipy.special import gammaincinv  # here: it takes a tenth of what a command takes to start, and few ask
+    from scipy.special import gammaincinv  # here: it takes longer to load than NumPy, and few commands ask
 
     return np.asarray(2.0 * gammaincinv(0.5 * np.asarray(dimension), probability))
 

@@ -16,7 +16,6 @@ from physics_prior.recording.messages import ColorRGBA, Header, Marker, MarkerAr
 SHAFT, HEAD, DOT = 0.04, 0.1, 0.08  # diameters of an arrow and of a point of contact, of the size of the model
 LEAST_ARROW, LEAST_AXIS = 1e-3, 1e-3  # drawn: of the size of the model
 PROBABILITY = 0.95  # that the true point is inside its ellipsoid
-RADIUS = float(np.sqrt(chi_squared.quantile(PROBABILITY, 3)))  # in standard deviations
 
 PART_COLOR = ColorRGBA(0.55, 0.65, 0.8, 1.0)
 FORCE_COLOR = ColorRGBA(0.85, 0.2, 0.15, 1.0)
@@ -138,7 +137,7 @@ def _dots(
 
 
 def _uncertainty(header: Header, estimate: Estimate, simulator: Simulator, size: float) -> Iterator[Marker]:
-    nv = len(estimate.v)
+    nv, radius = len(estimate.v), np.sqrt(chi_squared.quantile(PROBABILITY, 3))  # in standard deviations
     of_positions = estimate.covariance[:nv, :nv]
     for index, link in enumerate(simulator.tree.links):
         center = link.mass_properties.center_of_mass
@@ -146,7 +145,7 @@ def _uncertainty(header: Header, estimate: Estimate, simulator: Simulator, size:
         J = simulator.jacobian(link.part, center)[3:]
         variances, axes = np.linalg.eigh(J @ of_positions @ J.T)
         axes[:, 0] *= np.sign(np.linalg.det(axes))  # a rotation, not a mirror
-        diameters = 2.0 * RADIUS * np.sqrt(np.maximum(variances, 0.0))
+        diameters = 2.0 * radius * np.sqrt(np.maximum(variances, 0.0))
         yield Marker(
             header,
             "uncertainty",

@@ -30,7 +30,7 @@ Report = Callable[[str], None]
 class Scheme:
     """An integrator at steps of its own size, or at equal ones.
 
-    Its settings, numbers, go from coarse to fine.
+    Its settings are numbers, from coarse to fine.
     """
 
     integrator: IntegratorName
